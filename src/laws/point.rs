@@ -1,0 +1,102 @@
+//! The law as one integration point sees it, and how materials mix there.
+//!
+//! Any of our materials has the power per volume
+//!
+//! ```text
+//! d.S d + beta tr(D)^2 + 4 eta_c (omega - w)^2 + M |grad w|^2,   d = (D_xx - D_yy, 2 D_xy)
+//! ```
+//! plus `-p div u`. An isotropic fluid has `S = eta I`. `beta = eta` makes the first two terms
+//! `2 eta D:D`, the form used for incompressible materials; a finite bulk viscosity has
+//! `beta = 0` and enters through the pressure.
+
+use nalgebra::Matrix2;
+
+/// Symmetric 2x2 matrix `[[a, c], [c, b]]` on the deviatoric rates, Pa s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sym2 {
+    pub a: f64,
+    pub b: f64,
+    pub c: f64,
+}
+
+impl Sym2 {
+    pub fn isotropic(eta: f64) -> Self {
+        Sym2 { a: eta, b: eta, c: 0.0 }
+    }
+
+    pub fn from_matrix(m: &Matrix2<f64>) -> Self {
+        Sym2 { a: m[(0, 0)], b: m[(1, 1)], c: m[(0, 1)] }
+    }
+
+    pub fn add_scaled(&mut self, f: f64, o: &Sym2) {
+        self.a += f * o.a;
+        self.b += f * o.b;
+        self.c += f * o.c;
+    }
+
+    /// Inverse; the matrix must be positive definite.
+    pub fn inverse(&self) -> Self {
+        let det = self.a * self.b - self.c * self.c;
+        Sym2 { a: self.b / det, b: self.a / det, c: -self.c / det }
+    }
+
+    /// `d.S d`
+    pub fn quadratic(&self, d: [f64; 2]) -> f64 {
+        self.a * d[0] * d[0] + self.b * d[1] * d[1] + 2.0 * self.c * d[0] * d[1]
+    }
+}
+
+/// Coefficients of the power at one integration point (units in the module text).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointLaw {
+    /// S
+    pub shear: Sym2,
+    /// beta
+    pub dilation: f64,
+    /// eta_c
+    pub coupling: f64,
+    /// M
+    pub couple: f64,
+}
+
+/// How the materials that share a cell combine at an integration point.
+///
+/// Deviatoric viscosity: harmonic, `S^-1 = sum phi_m S_m^-1`, so a cell cut by an interface
+/// shears as its weaker part allows. Dilation term: harmonic like the shear part it belongs to.
+/// Coupling and couple viscosity: arithmetic, so that the natural (moment-free) condition at
+/// the rim of a Cosserat material is the one of its own share of the cell.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mixture {
+    fluidity: Sym2,
+    inverse_dilation: f64,
+    dilation_share: f64,
+    coupling: f64,
+    couple: f64,
+}
+
+impl Mixture {
+    /// Adds a material that holds the volume fraction `phi` of the point.
+    pub fn add(&mut self, phi: f64, law: &PointLaw) {
+        self.fluidity.add_scaled(phi, &law.shear.inverse());
+        if law.dilation > 0.0 {
+            self.inverse_dilation += phi / law.dilation;
+            self.dilation_share += phi;
+        }
+        self.coupling += phi * law.coupling;
+        self.couple += phi * law.couple;
+    }
+
+    /// The law of the mixture; fractions must add up to one.
+    pub fn law(&self) -> PointLaw {
+        PointLaw {
+            shear: self.fluidity.inverse(),
+            dilation: if self.dilation_share > 0.0 {
+                self.dilation_share * self.dilation_share / self.inverse_dilation
+            } else {
+                0.0
+            },
+            coupling: self.coupling,
+            couple: self.couple,
+        }
+    }
+}

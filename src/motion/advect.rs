@@ -1,0 +1,54 @@
+//! Moving the particles: position, director, volume.
+
+use super::carrier::Carrier;
+use super::gauges::Counter;
+use crate::plan::EffectSet;
+use crate::space::particles::Particles;
+use crate::space::population::Count;
+
+/// Moves all particles through a step. `particles` must be sorted; they are not afterwards.
+/// `compliant[m]`: volumes of material `m` follow the flow.
+pub fn advance(
+    carrier: &Carrier,
+    particles: &mut Particles,
+    effects: &EffectSet,
+    compliant: &[bool],
+    gauges: &mut [Counter],
+    count: &mut Count,
+) {
+    let mesh = carrier.mesh;
+    let mut left = Vec::new();
+    for cell in 0..mesh.cells() {
+        for p in particles.of_cell(cell) {
+            let from = particles.position[p];
+            let journey = carrier.travel(cell, from);
+            count.held += u64::from(journey.held);
+            let material = particles.material[p];
+            let volume = particles.volume[p];
+            if effects.directors || effects.volume_change {
+                let l = carrier.gradient(journey.middle);
+                if let Some(director) = &mut particles.director {
+                    director[p] = carrier.turn(director[p], &l);
+                }
+                if compliant[material as usize] {
+                    particles.volume[p] *= (l.trace() * carrier.dt).exp();
+                }
+            }
+            match journey.to {
+                Some(to) => {
+                    for gauge in gauges.iter_mut() {
+                        gauge.pass(mesh, from, to, material, volume);
+                    }
+                    particles.position[p] = mesh.wrap(to);
+                }
+                None => left.push(p),
+            }
+        }
+    }
+    if !left.is_empty() {
+        count.left += left.len() as u64;
+        let mut gone = vec![false; particles.len()];
+        left.iter().for_each(|&p| gone[p] = true);
+        particles.remove(&gone);
+    }
+}

@@ -1,0 +1,6 @@
+//! What moves with the flow: particles with their history, dye lines, and gauges that count.
+
+pub mod advect;
+pub mod carrier;
+pub mod gauges;
+pub mod tracers;

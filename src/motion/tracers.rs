@@ -1,0 +1,109 @@
+//! Dye: passive polylines, refined as they stretch so that they stay smooth.
+
+use super::carrier::Carrier;
+use crate::plan::Tracers;
+use crate::space::mesh::Mesh;
+
+/// Beyond this many points lines are refined no further; a warning says so.
+const MAX_POINTS: usize = 200_000;
+
+/// Lines of dye. Points are not wrapped around periodic sides, so a line stays connected.
+#[derive(Clone, Debug)]
+pub struct DyeLines {
+    pub lines: Vec<Vec<[f64; 2]>>,
+    spacing: f64,
+}
+
+impl DyeLines {
+    pub fn new(plan: &Tracers) -> Self {
+        DyeLines { lines: plan.lines.clone(), spacing: plan.spacing }
+    }
+
+    pub fn points(&self) -> usize {
+        self.lines.iter().map(Vec::len).sum()
+    }
+    /// Refinement has stopped.
+    pub fn is_full(&self) -> bool {
+        self.points() >= MAX_POINTS
+    }
+
+    /// Moves all points through a step, then refines stretched and thins crowded parts.
+    pub fn advance(&mut self, carrier: &Carrier) {
+        let mesh = carrier.mesh;
+        for line in &mut self.lines {
+            line.retain_mut(|p| {
+                let inside = mesh.wrap(*p);
+                let offset = [p[0] - inside[0], p[1] - inside[1]];
+                match carrier.travel(mesh.locate(inside), inside).to {
+                    Some(q) => {
+                        *p = [q[0] + offset[0], q[1] + offset[1]];
+                        true
+                    }
+                    None => false,
+                }
+            });
+        }
+        let mut room = MAX_POINTS.saturating_sub(self.points());
+        for line in &mut self.lines {
+            *line = respaced(line, self.spacing, &mut room);
+        }
+    }
+
+    /// The lines as drawn: wrapped into the domain and cut where they cross a periodic side.
+    pub fn wrapped(&self, mesh: &Mesh) -> Vec<Vec<[f64; 2]>> {
+        let mut out = Vec::new();
+        for line in &self.lines {
+            let mut part: Vec<[f64; 2]> = Vec::new();
+            let mut shift = [f64::NAN; 2];
+            for p in line {
+                let q = mesh.wrap(*p);
+                let s = [p[0] - q[0], p[1] - q[1]];
+                let jumped = (s[0] - shift[0]).abs() > 1e-9 || (s[1] - shift[1]).abs() > 1e-9;
+                if jumped && !part.is_empty() {
+                    out.push(std::mem::take(&mut part));
+                }
+                shift = s;
+                part.push(q);
+            }
+            if part.len() > 1 {
+                out.push(part);
+            }
+        }
+        out
+    }
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The line with points inserted where they are farther apart than `spacing`, and left out where
+/// they crowd.
+fn respaced(line: &[[f64; 2]], spacing: f64, room: &mut usize) -> Vec<[f64; 2]> {
+    let mut out: Vec<[f64; 2]> = Vec::with_capacity(line.len());
+    for (k, &p) in line.iter().enumerate() {
+        let inner = k > 0 && k + 1 < line.len();
+        if inner && out.last().is_some_and(|&q| distance(q, line[k + 1]) < 0.4 * spacing) {
+            continue;
+        }
+        if let Some(&q) = out.last()
+            && distance(p, q) > spacing
+            && *room > 0
+        {
+            let before = if out.len() > 1 { out[out.len() - 2] } else { q };
+            let after = if k + 1 < line.len() { line[k + 1] } else { p };
+            out.push(between(before, q, p, after));
+            *room -= 1;
+        }
+        out.push(p);
+    }
+    out
+}
+
+/// Point halfway from `b` to `c` on the cubic through four points; on the chord where the cubic
+/// strays, as at folds.
+fn between(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> [f64; 2] {
+    let chord = [0.5 * (b[0] + c[0]), 0.5 * (b[1] + c[1])];
+    let cubic: [f64; 2] = std::array::from_fn(|k| (9.0 * (b[k] + c[k]) - a[k] - d[k]) / 16.0);
+    if distance(chord, cubic) < 0.25 * distance(b, c) { cubic } else { chord }
+}

@@ -1,0 +1,211 @@
+//! Which effects a scene calls for, why, and what each brings: the answer of `grainscope plan`.
+
+use super::Plan;
+use crate::scene::Quadrature;
+use serde::Serialize;
+
+/// One effect: solved or left out, and why.
+#[derive(Clone, Debug, Serialize)]
+pub struct Effect {
+    pub name: &'static str,
+    pub solved: bool,
+    pub why: String,
+    /// Unknowns it adds.
+    pub unknowns: usize,
+    /// Bytes it adds to each particle.
+    pub particle_bytes: usize,
+    /// Stages of a step it adds.
+    pub stages: Vec<&'static str>,
+}
+
+/// All effects with the sizes of the problem.
+#[derive(Clone, Debug, Serialize)]
+pub struct EffectList {
+    pub scene: String,
+    pub cells: [usize; 2],
+    pub smallest_cell: [f64; 2],
+    pub largest_cell: [f64; 2],
+    pub unknowns: usize,
+    pub pressure_unknowns: usize,
+    pub particles_per_cell: usize,
+    pub particle_columns: Vec<&'static str>,
+    pub stages: Vec<&'static str>,
+    pub effects: Vec<Effect>,
+    pub warnings: Vec<String>,
+}
+
+impl Plan {
+    /// What will be solved, and why.
+    pub fn describe(&self) -> EffectList {
+        let effects = self.list_effects();
+        let e = &self.effects;
+        let mut columns = vec!["position", "volume", "material"];
+        for (on, name) in [
+            (e.directors, "director"),
+            (e.carried_viscosity, "viscosity"),
+            (e.carried_density, "density"),
+            (!self.marks.is_empty(), "mark"),
+        ] {
+            if on {
+                columns.push(name);
+            }
+        }
+        let mut stages = vec!["integration points", "assembly", "factorisation", "corrections"];
+        stages.push("advection");
+        stages.extend(effects.iter().filter(|e| e.solved).flat_map(|e| e.stages.iter().copied()));
+        stages.push("population control");
+        let sizes = |axis: &crate::space::mesh::Axis| {
+            let all = (0..axis.cells()).map(|c| axis.size(c) * self.units.length);
+            let low = all.clone().fold(f64::INFINITY, f64::min);
+            (low, all.fold(0.0, f64::max))
+        };
+        let ((xl, xh), (yl, yh)) = (sizes(&self.mesh.x), sizes(&self.mesh.y));
+        EffectList {
+            scene: self.scene.name.clone(),
+            cells: [self.mesh.x.cells(), self.mesh.y.cells()],
+            smallest_cell: [xl, yl],
+            largest_cell: [xh, yh],
+            unknowns: self.unknowns_per_node() * self.mesh.nodes(),
+            pressure_unknowns: 3 * self.mesh.cells(),
+            particles_per_cell: self.method.seeding.count(),
+            particle_columns: columns,
+            stages,
+            effects,
+            warnings: self.warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+
+    fn list_effects(&self) -> Vec<Effect> {
+        let materials = &self.state.materials;
+        let names = |f: &dyn Fn(&super::Material) -> bool| -> String {
+            let list: Vec<_> =
+                materials.iter().filter(|m| f(m)).map(|m| m.name.as_str()).collect();
+            list.join(", ")
+        };
+        let e = &self.effects;
+        let nodes = self.mesh.nodes();
+        let mut list = Vec::new();
+        let mut add = |name, solved, why: String, unknowns, particle_bytes, stages: &[_]| {
+            let (unknowns, particle_bytes) = if solved { (unknowns, particle_bytes) } else { (0, 0) };
+            list.push(Effect { name, solved, why, unknowns, particle_bytes, stages: stages.to_vec() });
+        };
+        let why = |on: bool, yes: String, no: &str| if on { yes } else { no.to_string() };
+        add(
+            "velocity and pressure",
+            true,
+            "every scene: Q2 velocity, discontinuous linear pressure".into(),
+            2 * nodes + 3 * self.mesh.cells(),
+            0,
+            &[],
+        );
+        add(
+            "Cosserat rotation",
+            e.rotation,
+            why(
+                e.rotation,
+                format!("coupling viscosity and internal length: {}", names(&|m| m.rotation.is_some())),
+                "no material has both a coupling viscosity and an internal length above zero",
+            ),
+            nodes,
+            0,
+            &[],
+        );
+        add(
+            "directors",
+            e.directors,
+            why(
+                e.directors,
+                format!("layered: {}", names(&|m| m.layer_viscosity.is_some())),
+                "no material has a layer viscosity other than its shear viscosity",
+            ),
+            0,
+            16,
+            &["director turning"],
+        );
+        add(
+            "gravity",
+            e.gravity,
+            why(
+                e.gravity,
+                format!("acts on: {}", names(&|m| m.density != 0.0 || m.carries_density)),
+                "no gravity, or nothing with a density",
+            ),
+            0,
+            0,
+            &["body force"],
+        );
+        add(
+            "fixed body force",
+            self.body_force.is_some(),
+            why(self.body_force.is_some(), "[body_force]".into(), "no [body_force]"),
+            0,
+            0,
+            &[],
+        );
+        add(
+            "background without particles",
+            self.background().is_some(),
+            why(
+                self.background().is_some(),
+                format!("{}: particles only in a band around the others", names(&|m| m.background)),
+                "no material is a background",
+            ),
+            0,
+            0,
+            &[],
+        );
+        add(
+            "carried viscosity",
+            e.carried_viscosity,
+            why(e.carried_viscosity, names(&|m| m.carries_viscosity), "every viscosity is constant"),
+            0,
+            8,
+            &[],
+        );
+        add(
+            "carried density",
+            e.carried_density,
+            why(e.carried_density, names(&|m| m.carries_density), "every density is constant"),
+            0,
+            8,
+            &[],
+        );
+        add(
+            "volume change",
+            e.volume_change,
+            why(
+                e.volume_change,
+                format!("finite bulk viscosity: {}", names(&|m| m.compliance > 0.0)),
+                "every material is incompressible",
+            ),
+            0,
+            0,
+            &["volume change"],
+        );
+        let dye = self.tracers.is_some();
+        add("dye lines", dye, why(dye, "[dye]".into(), "no [dye] lines"), 0, 0, &["dye"]);
+        let gauges = !self.gauges.is_empty();
+        add(
+            "gauges",
+            gauges,
+            why(
+                gauges,
+                self.gauges.iter().map(|g| g.name.as_str()).collect::<Vec<_>>().join(", "),
+                "no [[gauges]]",
+            ),
+            0,
+            0,
+            &["gauges"],
+        );
+        let plain = self.method.quadrature == Quadrature::Particles;
+        add(
+            "local harmonic mixture",
+            !plain,
+            why(!plain, "accuracy.quadrature = \"mixture\"".into(), "accuracy.quadrature = \"particles\""),
+            0,
+            0,
+            &[],
+        );
+        list
+    }
+}

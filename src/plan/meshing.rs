@@ -1,0 +1,159 @@
+//! Mesh lines: on everything that needs one, and graded towards what is singular.
+
+/// A coordinate that must be a mesh line, and what demands it.
+#[derive(Clone, Debug)]
+pub struct Line {
+    pub at: f64,
+    /// For messages; explicit lines of the scene may lie as close as they like.
+    pub owner: String,
+    pub explicit: bool,
+}
+
+/// A coordinate towards which cells shrink.
+#[derive(Clone, Copy, Debug)]
+pub struct Refinement {
+    pub at: f64,
+    /// Cells there are smaller by this factor.
+    pub factor: f64,
+}
+
+/// How large cells are.
+#[derive(Clone, Debug)]
+pub struct Sizing {
+    /// Size away from refinements.
+    pub size: f64,
+    pub refinements: Vec<Refinement>,
+    /// Ratio of neighbouring cells in graded parts.
+    pub growth: f64,
+}
+
+/// Two demanded lines with less than a cell between them.
+#[derive(Debug)]
+pub struct TooClose {
+    pub first: Line,
+    pub second: Line,
+    /// Cell size there.
+    pub size: f64,
+}
+
+impl Sizing {
+    /// Cell size at a coordinate: geometric growth away from each refinement.
+    fn at(&self, x: f64) -> f64 {
+        let slope = self.growth.ln();
+        self.refinements
+            .iter()
+            .map(|r| self.size / r.factor + slope * (x - r.at).abs())
+            .fold(self.size, f64::min)
+    }
+
+    /// Mesh lines along an axis: through all demanded coordinates, cells in between as large as
+    /// the sizing allows.
+    pub fn lines(&self, mut demanded: Vec<Line>) -> Result<Vec<f64>, TooClose> {
+        demanded.sort_by(|a, b| a.at.total_cmp(&b.at));
+        let span = demanded.last().map_or(0.0, |l| l.at) - demanded.first().map_or(0.0, |l| l.at);
+        demanded.dedup_by(|b, a| {
+            let same = b.at - a.at <= 1e-9 * span;
+            a.explicit |= same && b.explicit;
+            same
+        });
+        let mut lines = vec![demanded[0].at];
+        for pair in demanded.windows(2) {
+            let (a, b) = (&pair[0], &pair[1]);
+            let cells = self.cells_between(a.at, b.at);
+            if cells < 1.0 - 1e-6 && !a.explicit && !b.explicit {
+                return Err(TooClose {
+                    first: a.clone(),
+                    second: b.clone(),
+                    size: (b.at - a.at) / cells,
+                });
+            }
+            self.fill(a.at, b.at, (cells - 1e-6).ceil().max(1.0) as usize, &mut lines);
+        }
+        Ok(lines)
+    }
+
+    fn is_uniform_between(&self, a: f64, b: f64) -> bool {
+        // The size is concave between refinements, so ends and refinements inside decide.
+        self.at(a) >= self.size
+            && self.at(b) >= self.size
+            && !self.refinements.iter().any(|r| r.at > a && r.at < b)
+    }
+
+    /// `integral dx / size`
+    fn cells_between(&self, a: f64, b: f64) -> f64 {
+        if self.is_uniform_between(a, b) { (b - a) / self.size } else { self.cumulative(a, b)[SAMPLES] }
+    }
+
+    fn cumulative(&self, a: f64, b: f64) -> Vec<f64> {
+        let dx = (b - a) / SAMPLES as f64;
+        let mut sum = 0.0;
+        let mut out = vec![0.0];
+        for k in 0..SAMPLES {
+            // Midpoint rule: symmetric about the middle.
+            sum += dx / self.at(a + (k as f64 + 0.5) * dx);
+            out.push(sum);
+        }
+        out
+    }
+
+    /// Appends `n` cells' upper lines from `a` to `b`, equally spaced in `integral dx / size`.
+    fn fill(&self, a: f64, b: f64, n: usize, lines: &mut Vec<f64>) {
+        if self.is_uniform_between(a, b) {
+            lines.extend((1..n).map(|i| a + (b - a) * i as f64 / n as f64));
+        } else {
+            let sum = self.cumulative(a, b);
+            for i in 1..n {
+                let target = sum[SAMPLES] * i as f64 / n as f64;
+                let k = sum.partition_point(|&s| s < target).clamp(1, SAMPLES);
+                let t = (target - sum[k - 1]) / (sum[k] - sum[k - 1]);
+                lines.push(a + (b - a) * (k as f64 - 1.0 + t) / SAMPLES as f64);
+            }
+        }
+        lines.push(b);
+    }
+}
+
+/// Samples of the cell size between two demanded lines.
+const SAMPLES: usize = 4096;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(at: f64) -> Line {
+        Line { at, owner: format!("line at {at}"), explicit: false }
+    }
+
+    #[test]
+    fn uniform_lines_divide_evenly_and_meet_demands() {
+        let s = Sizing { size: 0.25, refinements: vec![], growth: 1.2 };
+        let lines = s.lines(vec![line(0.0), line(1.0), line(0.5)]).unwrap();
+        assert_eq!(lines, [0.0, 0.25, 0.5, 0.75, 1.0]);
+    }
+
+    #[test]
+    fn graded_lines_shrink_towards_the_refinement_by_the_growth_ratio() {
+        let s = Sizing {
+            size: 0.25,
+            refinements: vec![Refinement { at: 1.0, factor: 8.0 }],
+            growth: 1.3,
+        };
+        let lines = s.lines(vec![line(0.0), line(1.0), line(2.0)]).unwrap();
+        let h: Vec<f64> = lines.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(lines.contains(&1.0));
+        assert!(h.windows(2).all(|w| w[0] / w[1] < 1.35 && w[1] / w[0] < 1.35), "{h:?}");
+        let smallest = h.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(smallest < 0.25 / 6.0 && smallest > 0.25 / 10.0);
+        let n = lines.len();
+        for i in 0..n {
+            assert!((lines[i] + lines[n - 1 - i] - 2.0).abs() < 1e-12, "not symmetric");
+        }
+    }
+
+    #[test]
+    fn lines_closer_than_a_cell_are_refused_by_name() {
+        let s = Sizing { size: 0.25, refinements: vec![], growth: 1.2 };
+        let e = s.lines(vec![line(0.0), line(0.1), line(1.0)]).unwrap_err();
+        assert_eq!((e.first.at, e.second.at), (0.0, 0.1));
+    }
+}

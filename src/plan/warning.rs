@@ -1,0 +1,82 @@
+//! What is allowed but worth knowing, with remedies.
+
+use std::fmt;
+
+/// A warning; the text says what to do about it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Warning {
+    /// Inertia would matter for these numbers, and is not solved.
+    Inertia { reynolds: f64 },
+    /// Layers that resist shear more than the matrix.
+    StiffLayers { material: String, ratio: f64 },
+    /// A coupling viscosity without an internal length, or the other way round.
+    NoInternalLength { material: String },
+    /// A rotation is prescribed but no material has one.
+    RotationUnused { place: String },
+    /// Directors given for a material that has no layers.
+    DirectorUnused { material: String },
+    /// A material that no region, and no background, uses.
+    MaterialUnused { material: String },
+    /// More particles than are written per frame.
+    ParticlesThinned { every: usize },
+    /// Dye lines stopped being refined.
+    DyeCoarse { points: usize },
+    /// Cells that had lost all particles were refilled.
+    CellsHealed { count: u64 },
+    /// Particles were held back at walls.
+    ParticlesHeld { count: u64 },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Warning::Inertia { reynolds } => write!(
+                f,
+                "inertia is not solved, but these numbers have a Reynolds number of {reynolds:.1e}: \
+                 read the result as the creeping flow of a scaled, more viscous scene"
+            ),
+            Warning::StiffLayers { material, ratio } => write!(
+                f,
+                "material `{material}`: layer_viscosity is {ratio:.3} times shear_viscosity; \
+                 layers usually shear more easily, so check that the two are not swapped"
+            ),
+            Warning::NoInternalLength { material } => write!(
+                f,
+                "material `{material}` has a coupling viscosity but no internal length: no \
+                 rotation is solved for it; give internal_length (or couple_viscosity) above zero"
+            ),
+            Warning::RotationUnused { place } => write!(
+                f,
+                "{place} prescribes a rotation, but no material of the scene has one: ignored; \
+                 give a material coupling_viscosity and internal_length"
+            ),
+            Warning::DirectorUnused { material } => write!(
+                f,
+                "directors are given for `{material}`, whose layers make no difference: ignored; \
+                 give it a layer_viscosity other than its shear_viscosity"
+            ),
+            Warning::MaterialUnused { material } => write!(
+                f,
+                "material `{material}` fills no region; add one, or remove the material"
+            ),
+            Warning::ParticlesThinned { every } => write!(
+                f,
+                "every {every}th particle is recorded; raise recording.max_particles for more"
+            ),
+            Warning::DyeCoarse { points } => write!(
+                f,
+                "dye lines reached {points} points and are refined no further; use fewer lines"
+            ),
+            Warning::CellsHealed { count } => write!(
+                f,
+                "{count} cells lost all their particles and were refilled from neighbours; \
+                 lower time.courant or raise accuracy.particles_per_cell"
+            ),
+            Warning::ParticlesHeld { count } => write!(
+                f,
+                "{count} particle steps would have crossed a wall and were held; \
+                 lower time.courant if that is many"
+            ),
+        }
+    }
+}

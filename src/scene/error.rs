@@ -1,0 +1,306 @@
+//! Errors in scene files, with the place they point at and what to do about them.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use miette::{Diagnostic, NamedSource, SourceSpan};
+use thiserror::Error;
+
+use super::load::SceneSource;
+
+/// Most errors reported at once.
+pub(super) const MAX_ERRORS: usize = 8;
+/// Longest message that is shown; what hostile input adds beyond is cut.
+const MAX_MESSAGE: usize = 600;
+/// Longest source line that is drawn; errors in longer ones only name the position.
+const MAX_LINE: usize = 400;
+
+/// Something wrong with a scene: what, where, and the remedy.
+///
+/// Made where the fault is noticed; [`SceneError::with_source`] adds file name and text, so that
+/// `miette` shows the line and [`SceneError::one_line`] names it.
+#[derive(Clone, Debug, Diagnostic, Error)]
+#[error("{message}")]
+#[diagnostic(code(grainscope::scene))]
+pub struct SceneError {
+    message: Box<str>,
+    #[help]
+    help: Option<Box<str>>,
+    label: Box<str>,
+    #[label("{label}")]
+    span: Option<SourceSpan>,
+    #[source_code]
+    text: Option<Arc<NamedSource<String>>>,
+    /// `file` or `file:line:column`.
+    place: Option<Box<str>>,
+    #[related]
+    related: Vec<SceneError>,
+}
+
+/// What an error can point at: a value of the scene or a byte range of its text.
+pub trait Place {
+    /// Bytes of the source text, unless made without one.
+    fn place(&self) -> Option<Range<usize>>;
+}
+
+impl Place for Range<usize> {
+    fn place(&self) -> Option<Range<usize>> {
+        Some(self.clone())
+    }
+}
+
+impl<P: Place> Place for Option<P> {
+    fn place(&self) -> Option<Range<usize>> {
+        self.as_ref().and_then(P::place)
+    }
+}
+
+impl SceneError {
+    /// An error that points nowhere.
+    pub fn new(message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
+        Self::at(&None::<Range<usize>>, message, help)
+    }
+
+    /// An error that points at a value or a byte range; an empty `help` is left out.
+    pub fn at(place: &impl Place, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
+        let help = help.as_ref();
+        SceneError {
+            message: printable(message.as_ref()).into(),
+            help: (!help.is_empty()).then(|| printable(help).into()),
+            label: "here".into(),
+            span: place.place().map(SourceSpan::from),
+            text: None,
+            place: None,
+            related: vec![],
+        }
+    }
+
+    /// Sets the words beside the underlined text.
+    pub fn with_label(mut self, label: impl AsRef<str>) -> Self {
+        self.label = printable(label.as_ref()).into();
+        self
+    }
+
+    /// Adds file name and text, here and to all related errors that have none yet.
+    pub fn with_source(mut self, source: &SceneSource) -> Self {
+        if self.place.is_none() {
+            self.locate(source);
+        }
+        self.related = self
+            .related
+            .into_iter()
+            .map(|e| e.with_source(source))
+            .collect();
+        self
+    }
+
+    fn locate(&mut self, source: &SceneSource) {
+        let name = printable(source.name());
+        let Some(span) = self.span else {
+            self.place = Some(name.into());
+            return;
+        };
+        let text = source.text();
+        let start = text.floor_char_boundary(span.offset());
+        let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
+        let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
+        // What spans several lines is shown by the first of them.
+        let end = text.floor_char_boundary(span.offset().saturating_add(span.len()));
+        self.span = Some((start..end.clamp(start, line_end)).into());
+        let line = text[..start].matches('\n').count();
+        let column = 1 + text[line_start..start].chars().count();
+        let place = format!("{name}:{}:{column}", line + 1);
+        let near = text.lines().skip(line.saturating_sub(1)).take(3);
+        if near.map(str::len).all(|length| length <= MAX_LINE) {
+            self.text = Some(Arc::new(NamedSource::new(&name, without_controls(text))));
+        } else {
+            let help = self
+                .help
+                .take()
+                .map(|help| format!("{help}; "))
+                .unwrap_or_default();
+            self.help = Some(format!("{help}at {place}").into());
+        }
+        self.place = Some(place.into());
+    }
+
+    /// The first of several errors, with the next few as related ones; `Ok` if there are none.
+    pub fn join(errors: impl IntoIterator<Item = SceneError>) -> Result<(), SceneError> {
+        let mut errors = errors.into_iter();
+        let Some(mut first) = errors.next() else {
+            return Ok(());
+        };
+        first.related.extend(errors.take(MAX_ERRORS - 1));
+        Err(first)
+    }
+
+    /// What is wrong.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// The remedy.
+    pub fn remedy(&self) -> Option<&str> {
+        self.help.as_deref()
+    }
+
+    /// The bytes of the source text it points at.
+    pub fn span(&self) -> Option<Range<usize>> {
+        self.span.map(|s| s.offset()..s.offset() + s.len())
+    }
+
+    /// The other errors found at the same time.
+    pub fn others(&self) -> &[SceneError] {
+        &self.related
+    }
+
+    /// `file:line:column: message (help)`, without the related errors.
+    pub fn one_line(&self) -> String {
+        let mut line = String::new();
+        if let Some(place) = &self.place {
+            line.push_str(place);
+            line.push_str(": ");
+        }
+        line.push_str(&self.message);
+        if let Some(help) = &self.help {
+            line.push_str(" (");
+            line.push_str(help);
+            line.push(')');
+        }
+        line.replace('\n', " ")
+    }
+
+    /// This error and the related ones, one line each.
+    pub fn lines(&self) -> Vec<String> {
+        let related = self.related.iter().flat_map(SceneError::lines);
+        std::iter::once(self.one_line()).chain(related).collect()
+    }
+}
+
+/// The candidate most like a mistyped name, if any is like it.
+pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if name.len() > 100 {
+        return None;
+    }
+    let lower = name.to_lowercase();
+    let likeness = |c: &str| strsim::jaro_winkler(&lower, &c.to_lowercase());
+    candidates
+        .into_iter()
+        .map(|c| (c, likeness(c)))
+        .filter(|(_, likeness)| *likeness > 0.78)
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(c, _)| c)
+}
+
+/// `did you mean ...? <what> are: ...`, as far as it applies.
+pub(super) fn suggestion(name: &str, what: &str, candidates: &[&str]) -> String {
+    let mut text = closest(name, candidates.iter().copied())
+        .map(|c| format!("did you mean `{c}`? "))
+        .unwrap_or_default();
+    if candidates.is_empty() {
+        text.push_str(&format!("{what}: none"));
+    } else {
+        let shown: Vec<_> = candidates
+            .iter()
+            .take(24)
+            .map(|c| format!("`{c}`"))
+            .collect();
+        let more = if shown.len() < candidates.len() {
+            ", ..."
+        } else {
+            ""
+        };
+        text.push_str(&format!("{what}: {}{more}", shown.join(", ")));
+    }
+    text
+}
+
+/// The text with control characters masked and cut to a length fit to print.
+fn printable(text: &str) -> String {
+    let shown = text
+        .get(..text.floor_char_boundary(MAX_MESSAGE))
+        .unwrap_or_default();
+    let ellipsis = if shown.len() < text.len() { "..." } else { "" };
+    without_controls(shown) + ellipsis
+}
+
+/// Replaces ASCII control characters byte by byte, so that a file cannot steer the terminal.
+fn without_controls(text: &str) -> String {
+    let mask = |c: char| c.is_ascii_control() && c != '\n' && c != '\t' && c != '\r';
+    text.replace(mask, "?")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn source(text: &str) -> SceneSource {
+        SceneSource::new("s.toml", text)
+    }
+
+    fn draw(error: &SceneError) -> String {
+        let mut out = String::new();
+        let theme = miette::GraphicalTheme::unicode_nocolor();
+        let handler = miette::GraphicalReportHandler::new_themed(theme);
+        handler
+            .render_report(&mut out, error)
+            .expect("writes to a string");
+        out
+    }
+
+    #[test]
+    fn shows_file_line_and_column() {
+        let error = SceneError::at(&(7..8), "bad value", "use 3").with_source(&source("a=1\nbé=2"));
+        assert_eq!(error.one_line(), "s.toml:2:3: bad value (use 3)");
+        let drawn = draw(&error);
+        assert!(
+            drawn.contains("s.toml:2:") && drawn.contains("bé=2"),
+            "{drawn}"
+        );
+        assert!(drawn.contains("use 3"), "{drawn}");
+    }
+
+    #[test]
+    fn survives_spans_that_do_not_fit() {
+        for span in [3..90, 90..95, 1..2, 0..0, usize::MAX - 1..usize::MAX] {
+            let error = SceneError::at(&span, "bad", "").with_source(&source("é"));
+            draw(&error);
+            assert!(
+                error.one_line().starts_with("s.toml:1:"),
+                "{}",
+                error.one_line()
+            );
+        }
+    }
+
+    #[test]
+    fn joins_errors() {
+        assert!(SceneError::join([]).is_ok());
+        let both = [
+            SceneError::at(&(0..1), "one", ""),
+            SceneError::at(&(4..5), "two", ""),
+        ];
+        let error = SceneError::join(both)
+            .expect_err("two")
+            .with_source(&source("a=1\nb=2"));
+        assert_eq!(error.lines(), ["s.toml:1:1: one", "s.toml:2:1: two"]);
+        assert!(draw(&error).contains("s.toml:2:1"));
+    }
+
+    #[test]
+    fn masks_and_cuts_hostile_text() {
+        let text = "\u{1b}[2J".repeat(1000);
+        let error = SceneError::at(&(0..4), &text, "").with_source(&source(&text));
+        assert!(!draw(&error).contains('\u{1b}'));
+        assert!(draw(&error).len() < 2000);
+        assert!(draw(&error).contains("s.toml:1:1"));
+    }
+
+    #[test]
+    fn finds_the_closest_name() {
+        let names = ["density", "shear_viscosity", "colour"];
+        assert_eq!(closest("dnsity", names), Some("density"));
+        assert_eq!(closest("Colour", names), Some("colour"));
+        assert_eq!(closest("zzz", names), None);
+    }
+}

@@ -1,0 +1,21 @@
+//! Scene files: what a run computes, as TOML.
+//!
+//! [`types`] is the format. A [`SceneSource`] is a text with a name, from a file ([`load()`]) or a
+//! preset ([`presets::find`]); [`SceneSource::with_sets`] edits it, [`parse`] reads it into a
+//! [`Scene`]. Values are [`Quantity`]s and [`Field`]s, evaluated in the [`Scope`] of the scene's
+//! parameters. All faults are [`SceneError`]s, which know file, line, column and remedy.
+
+pub mod error;
+pub mod expr;
+pub mod load;
+pub mod presets;
+pub mod quantity;
+pub mod scope;
+pub mod sets;
+pub mod types;
+
+pub use error::{Place, SceneError, closest};
+pub use load::{SCHEMA, SceneSource, json_schema, load, parse, scene_hash, to_toml};
+pub use quantity::{Field, FieldFn, Quantity};
+pub use scope::Scope;
+pub use types::*;

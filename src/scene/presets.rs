@@ -1,0 +1,80 @@
+//! Scenes that come with the program.
+
+use super::error::{SceneError, suggestion};
+use super::load::{SceneSource, parse};
+
+/// Names and texts.
+const PRESETS: [(&str, &str); 1] = [("silo", include_str!("../../presets/silo.toml"))];
+
+/// Names and one-line descriptions, in the order to show them.
+pub fn list() -> Vec<(&'static str, String)> {
+    let description = |name, text| {
+        parse(&SceneSource::new(name, text))
+            .map(|scene| scene.description)
+            .unwrap_or_default()
+    };
+    PRESETS
+        .iter()
+        .map(|&(name, text)| (name, description(name, text)))
+        .collect()
+}
+
+/// The preset of a name.
+pub fn find(name: &str) -> Result<SceneSource, SceneError> {
+    match PRESETS.iter().find(|preset| preset.0 == name) {
+        Some((name, text)) => Ok(SceneSource::new(*name, *text)),
+        None => {
+            let names: Vec<_> = PRESETS.iter().map(|preset| preset.0).collect();
+            let help = suggestion(name, "presets are", &names);
+            Err(SceneError::new(
+                format!("there is no preset `{name}`"),
+                help,
+            ))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Scope, json_schema, to_toml};
+
+    #[test]
+    fn all_presets_are_valid_and_described() {
+        for (name, description) in list() {
+            assert!(!description.is_empty(), "{name}");
+            let scene = parse(&find(name).expect("listed")).expect(name);
+            assert_eq!(scene.name, name);
+            Scope::new(&scene).expect(name);
+            let again = parse(&SceneSource::new(name, to_toml(&scene))).expect(name);
+            assert_eq!(to_toml(&again), to_toml(&scene));
+        }
+        assert!(json_schema().contains("\"schema\""));
+    }
+
+    #[test]
+    fn suggests_presets() {
+        let error = find("silos").expect_err("not a preset");
+        assert!(
+            error.one_line().contains("did you mean `silo`?"),
+            "{}",
+            error.one_line()
+        );
+    }
+
+    #[test]
+    fn silo_values() {
+        let scene = parse(&find("silo").expect("listed")).expect("valid");
+        let scope = Scope::new(&scene).expect("valid");
+        let grains = &scene.materials["grains"];
+        let length = grains
+            .internal_length
+            .as_ref()
+            .expect("given")
+            .eval(&scope)
+            .expect("valid");
+        assert!((length - 1.0 / 3.0).abs() < 1e-15);
+        assert_eq!(scene.domain.x[0].eval(&scope).expect("valid"), -3.0);
+        assert_eq!(scene.walls.len(), 4);
+    }
+}

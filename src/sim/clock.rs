@@ -1,0 +1,81 @@
+//! Choosing the time step, by named limiters.
+
+use crate::plan::ClockPlan;
+use serde::Serialize;
+
+/// What set the size of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limiter {
+    /// No step was taken: row 0.
+    Start,
+    /// `time.courant`: cells crossed.
+    Courant,
+    /// `time.strain`: strain of layered material.
+    Strain,
+    /// `time.max_step`
+    MaxStep,
+    /// Steps grow by no more than a half each.
+    Growth,
+    /// A frame, a scheduled change or the end had to be met.
+    Stop,
+}
+
+impl Limiter {
+    pub fn name(self) -> &'static str {
+        match self {
+            Limiter::Start => "start",
+            Limiter::Courant => "courant",
+            Limiter::Strain => "strain",
+            Limiter::MaxStep => "max_step",
+            Limiter::Growth => "growth",
+            Limiter::Stop => "stop",
+        }
+    }
+}
+
+/// What the flow says about the step.
+#[derive(Clone, Copy, Debug)]
+pub struct Speeds {
+    /// Largest number of cells crossed per unit time.
+    pub crossings: f64,
+    /// Largest strain rate of layered material.
+    pub strain_rate: f64,
+}
+
+/// Growth of the step from one to the next: extrapolation of the velocity needs similar steps.
+const GROWTH: f64 = 1.5;
+
+/// The next step from `time`, after one of `previous`.
+pub fn next_step(
+    clock: &ClockPlan,
+    time: f64,
+    previous: Option<f64>,
+    speeds: Speeds,
+) -> (f64, Limiter) {
+    let stop = clock.stops.iter().copied().find(|&s| s > time * (1.0 + 1e-14)).unwrap_or(clock.end);
+    let remaining = stop - time;
+    let mut best = (clock.end, Limiter::Stop);
+    let mut limit = |dt: f64, name| {
+        if dt < best.0 {
+            best = (dt, name);
+        }
+    };
+    limit(clock.courant / speeds.crossings, Limiter::Courant);
+    limit(clock.strain / speeds.strain_rate, Limiter::Strain);
+    if let Some(dt) = clock.max_step {
+        limit(dt, Limiter::MaxStep);
+    }
+    if let Some(dt) = previous {
+        limit(GROWTH * dt, Limiter::Growth);
+    }
+    let (dt, name) = best;
+    if dt >= remaining {
+        (remaining, Limiter::Stop)
+    } else if dt > 0.5 * remaining {
+        // Two equal steps instead of one full and one tiny.
+        (0.5 * remaining, name)
+    } else {
+        (dt, name)
+    }
+}

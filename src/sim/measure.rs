@@ -1,0 +1,217 @@
+//! Diagnostics of a state.
+
+use super::clock::{Limiter, Speeds};
+use super::row::{GaugeRow, Phases, Row};
+use super::Simulation;
+use crate::plan::Plan;
+use crate::solve::element::{PointShape, Rates};
+use crate::space::particles::Particles;
+use crate::space::shape::Shape;
+use sha2::{Digest, Sha256};
+use std::time::Instant;
+
+/// The row before anything is known.
+pub fn empty_row(plan: &Plan) -> Row {
+    Row {
+        step: 0,
+        time: 0.0,
+        dt: 0.0,
+        dt_limiter: Limiter::Start,
+        wall: 0.0,
+        power_in: 0.0,
+        dissipation: 0.0,
+        power_error: 0.0,
+        divergence_error: 0.0,
+        volume_error: 0.0,
+        iterations: 0,
+        particles: 0,
+        max_speed: 0.0,
+        potential_energy: 0.0,
+        work: 0.0,
+        dissipated: 0.0,
+        director_error: 0.0,
+        active_rotation: 0,
+        splits: 0,
+        merges: 0,
+        held: 0,
+        gauges: vec![],
+        drift: vec![0.0; plan.state.materials.len()],
+        seconds: Phases::default(),
+    }
+}
+
+/// SHA-256 over the bits of everything particles carry.
+pub fn hash(p: &Particles) -> String {
+    let mut h = Sha256::new();
+    let mut floats = |values: &mut dyn Iterator<Item = f64>| {
+        for v in values {
+            h.update(v.to_bits().to_le_bytes());
+        }
+    };
+    floats(&mut p.position.iter().flatten().copied());
+    floats(&mut p.volume.iter().copied());
+    floats(&mut p.director.iter().flatten().flatten().copied());
+    floats(&mut p.viscosity.iter().flatten().copied());
+    floats(&mut p.density.iter().flatten().copied());
+    h.update(&p.material);
+    h.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+impl<const D: usize> Simulation<D> {
+    /// What limits the next step.
+    pub(super) fn speeds(&self) -> Speeds {
+        let mesh = &self.plan.mesh;
+        let centre = Shape::at([0.0; 2]);
+        let layered: Vec<bool> =
+            self.matter.materials.iter().map(|m| m.layer_viscosity.is_some()).collect();
+        let mut speeds = Speeds { crossings: 0.0, strain_rate: 0.0 };
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let [hx, hy] = mesh.cell_size(cell);
+            let nodal = self.flow.of_cell(mesh, cell);
+            for u in &nodal {
+                speeds.crossings = speeds.crossings.max(u[0].abs() / hx).max(u[1].abs() / hy);
+            }
+            if self.plan.effects.directors
+                && (0..layered.len()).any(|m| layered[m] && self.quadrature.fraction(cell, m) > 0.0)
+            {
+                let rates = Rates::new(&PointShape::new(&centre, [hx, hy]), &nodal);
+                let spin = rates.relative_spin.abs();
+                let rate = (2.0 * rates.strain_squared()).sqrt() + spin;
+                speeds.strain_rate = speeds.strain_rate.max(rate);
+            }
+        }
+        speeds
+    }
+
+    pub(super) fn projected_volumes(&self) -> Vec<f64> {
+        (0..self.matter.materials.len())
+            .map(|m| self.quadrature.projected_area(&self.plan.mesh, m))
+            .collect()
+    }
+
+    /// Of the particles in gravity, less what the background would have in their place.
+    fn potential_energy(&self) -> f64 {
+        let p = &self.particles;
+        let ground = self.plan.background().map_or(0.0, |b| self.matter.materials[b as usize].density);
+        let g = self.matter.gravity;
+        (0..p.len())
+            .map(|k| {
+                let m = &self.matter.materials[p.material[k] as usize];
+                let density = match &p.density {
+                    Some(d) if m.carries_density => d[k],
+                    _ => m.density,
+                };
+                let x = p.position[k];
+                -p.volume[k] * (density - ground) * (g[0] * x[0] + g[1] * x[1])
+            })
+            .sum()
+    }
+
+    /// Power of everything but gravity.
+    fn other_power(&self) -> f64 {
+        let weight: f64 = if self.plan.effects.gravity {
+            self.load
+                .iter()
+                .zip(&self.fixed_load)
+                .zip(&self.flow.velocity)
+                .map(|((l, f), u)| (l[0] - f[0]) * u[0] + (l[1] - f[1]) * u[1])
+                .sum()
+        } else {
+            0.0
+        };
+        self.report.power_in - weight
+    }
+
+    fn volume_error(&self) -> f64 {
+        let mesh = &self.plan.mesh;
+        let (mut sum, mut cells) = (0.0, 0);
+        for cell in 0..mesh.cells() {
+            let range = self.particles.of_cell(cell);
+            if !range.is_empty() {
+                let volume: f64 = self.particles.volume[range].iter().sum();
+                sum += (volume / mesh.cell_area(cell) - 1.0).powi(2);
+                cells += 1;
+            }
+        }
+        (sum / f64::from(cells.max(1))).sqrt()
+    }
+
+    /// Writes the row of the current state, reached by a step of `dt` that began at `clock`.
+    pub(super) fn measure(
+        &mut self,
+        dt: f64,
+        limiter: Limiter,
+        mut seconds: Phases,
+        iterations: u32,
+        clock: Instant,
+    ) {
+        let phase = Instant::now();
+        let plan = self.plan.clone();
+        let u = &plan.units;
+        let r = self.report;
+        let (power_in, dissipation) = (r.power_in * u.power(), r.dissipation * u.power());
+        let other = self.other_power() * u.power();
+        let dt_si = dt * u.time;
+        let before = &self.row;
+        let first = limiter == Limiter::Start;
+        let trapezoid = |total: f64, last: f64, now: f64| {
+            if first { 0.0 } else { total + 0.5 * dt_si * (last + now) }
+        };
+        let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
+        let work = trapezoid(before.work, self.last_other_power, other);
+        let larger = power_in.abs().max(dissipation.abs());
+        let drift = self
+            .projected_volumes()
+            .iter()
+            .zip(&self.baseline)
+            .map(|(now, start)| if *start > 0.0 { now / start - 1.0 } else { 0.0 })
+            .collect();
+        let gauges = self
+            .gauges
+            .iter()
+            .map(|g| GaugeRow {
+                volume: g.volume * u.area(),
+                rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
+                    * u.area_rate(),
+            })
+            .collect();
+        let director_error = self
+            .particles
+            .director
+            .iter()
+            .flatten()
+            .map(|n| (n[0].hypot(n[1]) - 1.0).abs())
+            .fold(0.0, f64::max);
+        let row = Row {
+            step: self.step,
+            time: self.si_time(),
+            dt: dt_si,
+            dt_limiter: limiter,
+            wall: 0.0,
+            power_in,
+            dissipation,
+            power_error: if larger > 0.0 { (power_in - dissipation).abs() / larger } else { 0.0 },
+            divergence_error: r.divergence,
+            volume_error: self.volume_error(),
+            iterations,
+            particles: self.particles.len(),
+            max_speed: self.flow.max_speed() * u.velocity(),
+            potential_energy: self.potential_energy() * u.energy(),
+            work,
+            dissipated,
+            director_error,
+            active_rotation: r.active_rotation,
+            splits: self.count.splits,
+            merges: self.count.merges,
+            held: self.count.held,
+            gauges,
+            drift,
+            seconds,
+        };
+        self.last_other_power = other;
+        self.row = row;
+        seconds.diagnostics += phase.elapsed().as_secs_f64();
+        self.row.seconds = seconds;
+        self.row.wall = clock.elapsed().as_secs_f64();
+    }
+}

@@ -1,0 +1,452 @@
+//! One run: the algorithm of a step, start to end.
+//!
+//! ```text
+//! choose dt                    named limiters
+//! velocity of the half step    extrapolated from two solutions, or solved for
+//! move particles, dye          explicit midpoint; walls hold, gauges count
+//! turn directors               exact map of the step's velocity gradient
+//! control the population       no cell empty or overfull
+//! integration points           local harmonic mixture of each cell's particles
+//! solve                        velocity, rotation, pressure
+//! ```
+
+pub mod clock;
+pub mod initial;
+mod measure;
+pub mod picture;
+pub mod row;
+
+use crate::motion::advect;
+use crate::motion::carrier::Carrier;
+use crate::motion::gauges::Counter;
+use crate::motion::tracers::DyeLines;
+use crate::plan::boundary::add_body_force;
+use crate::plan::{Matter, Plan, Warning, When};
+use crate::scene::Integrator;
+use crate::solve::cholesky::FactorError;
+use crate::solve::quadrature::{EmptyCell, Quadrature};
+use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};
+use crate::space::flow::Flow;
+use crate::space::particles::Particles;
+use crate::space::population::{Count, Population};
+use clock::{Limiter, next_step};
+use initial::Unfilled;
+use row::{Phases, Row};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Why a run cannot start or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    #[error(transparent)]
+    Unfilled(#[from] Unfilled),
+    #[error("the solver could not be set up: {0}")]
+    Setup(#[from] FactorError),
+    #[error("step {step}, t = {time:.6e} s: {source}")]
+    Empty { step: u64, time: f64, source: EmptyCell },
+    #[error("step {step}, t = {time:.6e} s: {source}")]
+    Solve { step: u64, time: f64, source: SolveError },
+    #[error("step {step}, t = {time:.6e} s: the time step has become {dt:.1e} s")]
+    Step { step: u64, time: f64, dt: f64 },
+}
+
+impl SimError {
+    /// The field went to infinity or not-a-number.
+    pub fn is_non_finite(&self) -> bool {
+        matches!(self, SimError::Solve { source: SolveError::NonFinite { .. }, .. })
+    }
+
+    /// What the user can do about it.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            SimError::Unfilled(_) => "see the message",
+            SimError::Setup(_) => "report this scene: the solver should accept every plan",
+            SimError::Empty { .. } => {
+                "lower time.courant, raise accuracy.particles_per_cell, or give the scene a \
+                 background material"
+            }
+            SimError::Solve { source: SolveError::Stalled { .. }, .. } => {
+                "raise accuracy.max_corrections or accuracy.tolerance, or lower the contrast"
+            }
+            SimError::Solve { source: SolveError::Factor { .. }, .. } => {
+                "likely cause: too few integration points (accuracy.quadrature = \"particles\" \
+                 with few particles per cell) or a contrast beyond 1e10; use \"mixture\""
+            }
+            SimError::Solve { source: SolveError::NonFinite { .. }, .. } => {
+                "likely cause: an expression that is undefined at some particle, or a contrast \
+                 beyond what double precision carries"
+            }
+            SimError::Step { .. } => {
+                "likely cause: a speed that grows without bound; look at the last frames, and \
+                 lower accuracy.cells or the contrast"
+            }
+        }
+    }
+}
+
+/// A run at one instant. `D` is 2, or 3 with Cosserat rotation; see [`start`] for the choice.
+pub struct Simulation<const D: usize> {
+    plan: Arc<Plan>,
+    stokes: Stokes<D>,
+    quadrature: Quadrature,
+    particles: Particles,
+    flow: Flow<D>,
+    /// Velocity of the solution before, and the step between the two.
+    previous: Option<(Vec<[f64; 2]>, f64)>,
+    /// Nodal forces that do not change: tractions and fixed body forces.
+    fixed_load: Vec<[f64; D]>,
+    load: Vec<[f64; D]>,
+    matter: Matter,
+    /// Counts changes of matter, so that constant element matrices know when to change.
+    version: u32,
+    next_change: usize,
+    population: Population,
+    gauges: Vec<Counter>,
+    dye: Option<DyeLines>,
+    count: Count,
+    time: f64,
+    step: u64,
+    /// Projected volumes at the start.
+    baseline: Vec<f64>,
+    last_other_power: f64,
+    row: Row,
+    report: Report,
+    events: Vec<String>,
+}
+
+/// A run whose number of unknowns per node was decided by its plan.
+pub trait Run: Send {
+    /// Takes one step.
+    fn step(&mut self) -> Result<(), SimError>;
+    fn is_finished(&self) -> bool;
+    /// Diagnostics of the current state.
+    fn row(&self) -> &Row;
+    fn plan(&self) -> &Plan;
+    fn particles(&self) -> &Particles;
+    /// Velocity and rotation (zero if none is solved), m/s and 1/s, at an SI point.
+    fn velocity_at(&self, p: [f64; 2]) -> [f64; 3];
+    /// Pa
+    fn pressure_at(&self, p: [f64; 2]) -> f64;
+    /// What the recording shows of the current state.
+    fn picture(&self) -> crate::frame::Picture;
+    /// SHA-256 over the bits of the particle state.
+    fn state_hash(&self) -> String;
+    /// Unknowns of the solver: velocity and rotation, pressure.
+    fn unknowns(&self) -> [usize; 2];
+    fn count(&self) -> Count;
+    /// Warnings that arose while running.
+    fn warnings(&self) -> Vec<Warning>;
+    /// What happened in the last step: changes of matter.
+    fn events(&self) -> &[String];
+}
+
+/// Sets a plan up and solves its first instant.
+pub fn start(plan: Arc<Plan>) -> Result<Box<dyn Run>, SimError> {
+    if plan.effects.rotation {
+        Ok(Box::new(Simulation::<3>::new(plan)?))
+    } else {
+        Ok(Box::new(Simulation::<2>::new(plan)?))
+    }
+}
+
+impl<const D: usize> Simulation<D> {
+    pub fn new(plan: Arc<Plan>) -> Result<Self, SimError> {
+        let clock = Instant::now();
+        let mesh = plan.mesh.clone();
+        let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
+        let stokes = Stokes::new(mesh.clone(), constraints)?;
+        let mut particles = initial::particles(&plan)?;
+        let population = Population {
+            seeding: plan.method.seeding,
+            background: plan.background(),
+            band: plan.clock.courant.ceil() as usize,
+        };
+        let mut count = Count::default();
+        population.control(&mesh, &mut particles, &mut count);
+        let mut fixed_load = vec![[0.0; D]; mesh.nodes()];
+        plan.boundary.add_tractions(&mesh, &plan.units, &mut fixed_load);
+        if let Some(f) = &plan.body_force {
+            add_body_force(&mesh, &plan.units, f, &mut fixed_load);
+        }
+        let mut sim = Simulation {
+            quadrature: Quadrature::new(
+                &mesh,
+                plan.method.quadrature,
+                plan.state.materials.len(),
+            ),
+            flow: Flow::zero(&mesh),
+            previous: None,
+            load: fixed_load.clone(),
+            fixed_load,
+            matter: plan.state.clone(),
+            version: 0,
+            next_change: 0,
+            population,
+            gauges: plan.gauges.iter().cloned().map(Counter::new).collect(),
+            dye: plan.tracers.as_ref().map(DyeLines::new),
+            count: Count::default(),
+            time: 0.0,
+            step: 0,
+            baseline: vec![],
+            last_other_power: 0.0,
+            row: measure::empty_row(&plan),
+            report: Report::default(),
+            events: vec![],
+            particles,
+            stokes,
+            plan,
+        };
+        sim.apply_changes();
+        let mut seconds = Phases::default();
+        sim.solve(&mut seconds)?;
+        sim.baseline = sim.projected_volumes();
+        sim.measure(0.0, Limiter::Start, seconds, sim.report.corrections, clock);
+        Ok(sim)
+    }
+
+    pub fn flow(&self) -> &Flow<D> {
+        &self.flow
+    }
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Takes one step.
+    pub fn advance(&mut self) -> Result<(), SimError> {
+        let clock = Instant::now();
+        let mut seconds = Phases::default();
+        let speeds = self.speeds();
+        let (dt, limiter) =
+            next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.1), speeds);
+        if !(dt > 1e-12 * self.plan.clock.end) {
+            let dt = dt * self.plan.units.time;
+            return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
+        }
+        let (half, extra) = self.half_step_velocity(dt, &mut seconds)?;
+
+        let phase = Instant::now();
+        let plan = self.plan.clone();
+        let compliant: Vec<bool> =
+            self.matter.materials.iter().map(|m| m.compliance > 0.0).collect();
+        let carrier =
+            Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &half, dt };
+        advect::advance(
+            &carrier,
+            &mut self.particles,
+            &plan.effects,
+            &compliant,
+            &mut self.gauges,
+            &mut self.count,
+        );
+        if let Some(dye) = &mut self.dye {
+            dye.advance(&carrier);
+        }
+        self.particles.sort(&plan.mesh);
+        seconds.motion += phase.elapsed().as_secs_f64();
+        let phase = Instant::now();
+        self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
+        seconds.population += phase.elapsed().as_secs_f64();
+
+        self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
+        self.step += 1;
+        let changed = self.apply_changes();
+        let before = self.flow.translation();
+        self.solve(&mut seconds)?;
+        // After a sudden change the velocity before says nothing about the one to come.
+        self.previous = (!changed).then_some((before, dt));
+        self.measure(dt, limiter, seconds, extra + self.report.corrections, clock);
+        Ok(())
+    }
+
+    fn si_time(&self) -> f64 {
+        self.time * self.plan.units.time
+    }
+
+    fn next_stop(&self) -> f64 {
+        let clock = &self.plan.clock;
+        let later = |&&s: &&f64| s > self.time * (1.0 + 1e-14);
+        clock.stops.iter().find(later).copied().unwrap_or(clock.end)
+    }
+
+    /// Velocity in the middle of a step of `dt`, and corrections spent on it.
+    fn half_step_velocity(
+        &mut self,
+        dt: f64,
+        seconds: &mut Phases,
+    ) -> Result<(Vec<[f64; 2]>, u32), SimError> {
+        let now = self.flow.translation();
+        match (self.plan.method.integrator, &self.previous) {
+            (Integrator::Euler, _) => Ok((now, 0)),
+            (Integrator::Extrapolated, Some((before, dt_before))) => {
+                let f = 0.5 * dt / dt_before;
+                let half = now
+                    .iter()
+                    .zip(before)
+                    .map(|(u, b)| [u[0] + f * (u[0] - b[0]), u[1] + f * (u[1] - b[1])])
+                    .collect();
+                Ok((half, 0))
+            }
+            (Integrator::Extrapolated | Integrator::Midpoint, _) => self.solve_half_step(dt, now, seconds),
+        }
+    }
+
+    /// Moves a copy of the particles half a step and solves there.
+    fn solve_half_step(
+        &mut self,
+        dt: f64,
+        now: Vec<[f64; 2]>,
+        seconds: &mut Phases,
+    ) -> Result<(Vec<[f64; 2]>, u32), SimError> {
+        let plan = self.plan.clone();
+        let phase = Instant::now();
+        let mut ahead = self.particles.clone();
+        let compliant = vec![false; self.matter.materials.len()];
+        let carrier = Carrier {
+            mesh: &plan.mesh,
+            enclosure: &plan.enclosure,
+            velocity: &now,
+            dt: 0.5 * dt,
+        };
+        let mut ignored = Count::default();
+        advect::advance(&carrier, &mut ahead, &plan.effects, &compliant, &mut [], &mut ignored);
+        ahead.sort(&plan.mesh);
+        self.population.control(&plan.mesh, &mut ahead, &mut ignored);
+        seconds.motion += phase.elapsed().as_secs_f64();
+        let here = std::mem::replace(&mut self.particles, ahead);
+        let flow = self.flow.clone();
+        let solved = self.solve(seconds);
+        let half = std::mem::replace(&mut self.flow, flow).translation();
+        self.particles = here;
+        solved?;
+        Ok((half, self.report.corrections))
+    }
+
+    /// Applies the changes of matter that are due; whether there were any.
+    fn apply_changes(&mut self) -> bool {
+        self.events.clear();
+        let mut any = false;
+        while let Some(change) = self.plan.changes.get(self.next_change) {
+            let due = match change.when {
+                When::Time(t) => t <= self.time * (1.0 + 1e-14),
+                When::Step(s) => s <= self.step,
+            };
+            if !due {
+                break;
+            }
+            self.matter = change.state.clone();
+            self.events.push(format!("step {}: {}", self.step, change.label));
+            self.version += 1;
+            self.next_change += 1;
+            any = true;
+        }
+        any
+    }
+
+    /// Solves for the flow of the particles where they are.
+    fn solve(&mut self, seconds: &mut Phases) -> Result<(), SimError> {
+        let plan = self.plan.clone();
+        let phase = Instant::now();
+        let (step, time) = (self.step, self.si_time());
+        self.quadrature
+            .update(&plan.mesh, &self.particles, &self.matter.materials, self.version)
+            .map_err(|mut source| {
+                source.x *= plan.units.length;
+                source.y *= plan.units.length;
+                SimError::Empty { step, time, source }
+            })?;
+        self.update_load();
+        seconds.quadrature += phase.elapsed().as_secs_f64();
+        let stopping = Stopping {
+            tolerance: plan.method.tolerance,
+            max_corrections: plan.method.max_corrections,
+        };
+        self.report = self
+            .stokes
+            .solve(&self.quadrature, &self.load, stopping, &mut self.flow)
+            .map_err(|source| SimError::Solve {
+                step,
+                time,
+                source: source.scaled(plan.units.length),
+            })?;
+        seconds.assemble += self.report.seconds.assemble;
+        seconds.factor += self.report.seconds.factor;
+        seconds.solve += self.report.seconds.solve;
+        Ok(())
+    }
+
+    fn update_load(&mut self) {
+        if !self.plan.effects.gravity {
+            return;
+        }
+        self.load.copy_from_slice(&self.fixed_load);
+        let mesh = &self.plan.mesh;
+        let g = self.matter.gravity;
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let area = mesh.cell_area(cell);
+            let mut mass = [0.0; 9];
+            self.quadrature.for_points(cell, |p, shape| {
+                let m = area * p.weight * p.density;
+                for (mass, n) in mass.iter_mut().zip(&shape.n) {
+                    *mass += m * n;
+                }
+            });
+            for (a, node) in mesh.cell_nodes(cell).into_iter().enumerate() {
+                self.load[node][0] += mass[a] * g[0];
+                self.load[node][1] += mass[a] * g[1];
+            }
+        }
+    }
+}
+
+impl<const D: usize> Run for Simulation<D> {
+    fn step(&mut self) -> Result<(), SimError> {
+        self.advance()
+    }
+    fn is_finished(&self) -> bool {
+        self.time >= self.plan.clock.end * (1.0 - 1e-12)
+    }
+    fn row(&self) -> &Row {
+        &self.row
+    }
+    fn plan(&self) -> &Plan {
+        &self.plan
+    }
+    fn particles(&self) -> &Particles {
+        &self.particles
+    }
+    fn velocity_at(&self, p: [f64; 2]) -> [f64; 3] {
+        let u = &self.plan.units;
+        let v = self.flow.at(&self.plan.mesh, p.map(|c| c / u.length));
+        let w = if D == 3 { v[D - 1] * u.rate() } else { 0.0 };
+        [v[0] * u.velocity(), v[1] * u.velocity(), w]
+    }
+    fn pressure_at(&self, p: [f64; 2]) -> f64 {
+        let u = &self.plan.units;
+        self.flow.pressure_at(&self.plan.mesh, p.map(|c| c / u.length)) * u.stress()
+    }
+    fn picture(&self) -> crate::frame::Picture {
+        self.draw()
+    }
+    fn state_hash(&self) -> String {
+        measure::hash(&self.particles)
+    }
+    fn unknowns(&self) -> [usize; 2] {
+        [self.stokes.unknowns(), 3 * self.plan.mesh.cells()]
+    }
+    fn count(&self) -> Count {
+        self.count
+    }
+    fn warnings(&self) -> Vec<Warning> {
+        let mut list = Vec::new();
+        if self.count.healed > 0 {
+            list.push(Warning::CellsHealed { count: self.count.healed });
+        }
+        if let Some(dye) = self.dye.as_ref().filter(|d| d.is_full()) {
+            list.push(Warning::DyeCoarse { points: dye.points() });
+        }
+        list
+    }
+    fn events(&self) -> &[String] {
+        &self.events
+    }
+}

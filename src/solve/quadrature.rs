@@ -1,0 +1,447 @@
+//! From particles to integration points.
+//!
+//! **Mixture** (default). Gauss points of every cell see the materials of the cell's own
+//! particles. The fraction of material `m` at Gauss point `g` is the particle volume near it,
+//! weighted by `exp(-r^2 / (0.4 h)^2)`; each material has its own law there, and the laws mix as
+//! [`Mixture`] says. A cell of one uniform material sees that law exactly, whatever its
+//! particles' places, so its element matrix is a constant.
+//!
+//! **Particles**. Each particle is an integration point with its own law and a weight
+//! proportional to its volume: the method of the source, for comparison.
+
+use crate::laws::point::{Mixture, PointLaw};
+use crate::plan::material::{Material, Texture};
+use crate::scene::Quadrature as Rule;
+use crate::space::mesh::Mesh;
+use crate::space::particles::Particles;
+use crate::space::shape::{GAUSS_3, GAUSS_3X3, Shape};
+
+/// Width of the fraction kernel in cells: 0.4 was the best of those measured.
+const KERNEL_WIDTH: f64 = 0.4;
+
+/// One integration point of a cell.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct IntegrationPoint {
+    pub law: PointLaw,
+    pub density: f64,
+    /// Share of the cell's area.
+    pub weight: f64,
+    /// Reference coordinates.
+    pub r: [f64; 2],
+}
+
+/// What a cell is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// One uniform material, named by its index and the version of the material table.
+    Uniform { material: u8, version: u32 },
+    /// Anything else: to be evaluated afresh.
+    Mixed,
+    /// A solid block.
+    Solid,
+    /// Not evaluated yet.
+    Unknown,
+}
+
+/// Integration points of all cells, and means the solver needs.
+pub struct Quadrature {
+    rule: Rule,
+    points: Vec<IntegrationPoint>,
+    start: Vec<u32>,
+    content: Vec<Content>,
+    /// Arithmetic mean viscosity of each cell; scales the penalty.
+    pub mean_viscosity: Vec<f64>,
+    /// Mean 1/B of each cell.
+    pub compliance: Vec<f64>,
+    /// Projected area of each material.
+    fractions: Vec<f64>,
+    materials: usize,
+}
+
+/// A cell that holds no particles though no background fills it.
+#[derive(Debug, thiserror::Error)]
+#[error("cell {cell} at ({x:.4e}, {y:.4e}) holds no particles and no background material fills it")]
+pub struct EmptyCell {
+    pub cell: usize,
+    pub x: f64,
+    pub y: f64,
+}
+
+impl Quadrature {
+    pub fn new(mesh: &Mesh, rule: Rule, materials: usize) -> Self {
+        let cells = mesh.cells();
+        let (points, start) = match rule {
+            Rule::Mixture => {
+                let mut points = vec![IntegrationPoint::default(); 9 * cells];
+                for (k, point) in points.iter_mut().enumerate() {
+                    let g = &GAUSS_3X3[k % 9];
+                    (point.weight, point.r) = (g.weight, g.r);
+                }
+                (points, (0..=cells as u32).map(|c| 9 * c).collect())
+            }
+            Rule::Particles => (Vec::new(), vec![0; cells + 1]),
+        };
+        Quadrature {
+            rule,
+            points,
+            start,
+            content: vec![Content::Unknown; cells],
+            mean_viscosity: vec![0.0; cells],
+            compliance: vec![0.0; cells],
+            fractions: vec![0.0; cells * materials],
+            materials,
+        }
+    }
+
+    pub fn content(&self, cell: usize) -> Content {
+        self.content[cell]
+    }
+
+    /// Integration points of a cell with their shape functions.
+    pub fn for_points(&self, cell: usize, mut f: impl FnMut(&IntegrationPoint, &Shape)) {
+        let range = self.start[cell] as usize..self.start[cell + 1] as usize;
+        match self.rule {
+            Rule::Mixture => {
+                for (p, g) in self.points[range].iter().zip(GAUSS_3X3.iter()) {
+                    f(p, &g.shape);
+                }
+            }
+            Rule::Particles => {
+                for p in &self.points[range] {
+                    f(p, &Shape::at(p.r));
+                }
+            }
+        }
+    }
+
+    /// Share of a material in a cell.
+    pub fn fraction(&self, cell: usize, material: usize) -> f64 {
+        self.fractions[cell * self.materials + material]
+    }
+
+    /// Area of a material as the solver sees it.
+    pub fn projected_area(&self, mesh: &Mesh, material: usize) -> f64 {
+        (0..mesh.cells()).map(|c| self.fraction(c, material) * mesh.cell_area(c)).sum()
+    }
+
+    /// Evaluates all cells whose content is not known to be unchanged. `particles` sorted.
+    pub fn update(
+        &mut self,
+        mesh: &Mesh,
+        particles: &Particles,
+        materials: &[Material],
+        version: u32,
+    ) -> Result<(), EmptyCell> {
+        let background = materials.iter().position(|m| m.background);
+        if self.rule == Rule::Particles {
+            self.points.clear();
+        }
+        let mut scratch = Scratch::new(materials.len());
+        for cell in 0..mesh.cells() {
+            let content = if mesh.solid[cell] {
+                Content::Solid
+            } else {
+                content(particles, cell, materials, background, version).ok_or_else(|| {
+                    let [x, y] = mesh.cell_centre(cell);
+                    EmptyCell { cell, x, y }
+                })?
+            };
+            let unchanged = content != Content::Mixed && content == self.content[cell];
+            self.content[cell] = content;
+            match self.rule {
+                Rule::Mixture => {
+                    if !unchanged {
+                        self.mix(mesh, cell, particles, materials, &mut scratch);
+                    }
+                }
+                Rule::Particles => self.list(mesh, cell, particles, materials),
+            }
+        }
+        Ok(())
+    }
+
+    /// Fills the means of a cell of one uniform material; its law.
+    fn fill_uniform(&mut self, cell: usize, material: usize, materials: &[Material]) -> PointLaw {
+        let m = &materials[material];
+        self.mean_viscosity[cell] = m.viscosity;
+        self.compliance[cell] = m.compliance;
+        let fractions = &mut self.fractions[cell * self.materials..][..self.materials];
+        fractions.fill(0.0);
+        fractions[material] = 1.0;
+        m.law(m.viscosity, &Texture::default())
+    }
+
+    fn mix(
+        &mut self,
+        mesh: &Mesh,
+        cell: usize,
+        particles: &Particles,
+        materials: &[Material],
+        scratch: &mut Scratch,
+    ) {
+        match self.content[cell] {
+            Content::Uniform { material, .. } => {
+                let law = self.fill_uniform(cell, material as usize, materials);
+                for p in &mut self.points[9 * cell..9 * cell + 9] {
+                    (p.law, p.density) = (law, materials[material as usize].density);
+                }
+            }
+            Content::Mixed => {
+                let points = &mut self.points[9 * cell..9 * cell + 9];
+                let fractions = &mut self.fractions[cell * self.materials..][..self.materials];
+                scratch.gather(mesh, cell, particles, materials);
+                let (viscosity, compliance) = scratch.evaluate(points, fractions, materials);
+                self.mean_viscosity[cell] = viscosity;
+                self.compliance[cell] = compliance;
+            }
+            Content::Solid | Content::Unknown => {}
+        }
+    }
+
+    /// Particles as integration points.
+    fn list(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
+        let range = particles.of_cell(cell);
+        if let Content::Uniform { material, .. } = self.content[cell] {
+            let law = self.fill_uniform(cell, material as usize, materials);
+            if range.is_empty() {
+                let density = materials[material as usize].density;
+                self.points.extend(GAUSS_3X3.iter().map(|g| IntegrationPoint {
+                    law,
+                    density,
+                    weight: g.weight,
+                    r: g.r,
+                }));
+            }
+        }
+        let total: f64 = particles.volume[range.clone()].iter().sum();
+        let fractions = &mut self.fractions[cell * self.materials..][..self.materials];
+        if !range.is_empty() {
+            fractions.fill(0.0);
+            self.mean_viscosity[cell] = 0.0;
+            self.compliance[cell] = 0.0;
+        }
+        for p in range {
+            let index = particles.material[p] as usize;
+            let m = &materials[index];
+            let weight = particles.volume[p] / total;
+            let eta = match &particles.viscosity {
+                Some(v) if m.carries_viscosity => v[p],
+                _ => m.viscosity,
+            };
+            let density = match &particles.density {
+                Some(d) if m.carries_density => d[p],
+                _ => m.density,
+            };
+            let mut texture = Texture::default();
+            if let (Some(d), Some(_)) = (&particles.director, m.layer_viscosity) {
+                texture.add(1.0, d[p]);
+            }
+            fractions[index] += weight;
+            self.mean_viscosity[cell] += weight * eta;
+            self.compliance[cell] += weight * m.compliance;
+            let r = mesh.to_reference(cell, particles.position[p]);
+            self.points.push(IntegrationPoint { law: m.law(eta, &texture), density, weight, r });
+        }
+        self.start[cell + 1] = self.points.len() as u32;
+    }
+}
+
+/// What a cell is made of; `None` if nothing fills it.
+fn content(
+    particles: &Particles,
+    cell: usize,
+    materials: &[Material],
+    background: Option<usize>,
+    version: u32,
+) -> Option<Content> {
+    let range = particles.of_cell(cell);
+    let first = match particles.material[range.clone()].first() {
+        Some(&m) => m,
+        None => background? as u8,
+    };
+    let single = particles.material[range].iter().all(|&m| m == first);
+    Some(if single && materials[first as usize].is_uniform() {
+        Content::Uniform { material: first, version }
+    } else {
+        Content::Mixed
+    })
+}
+
+/// Sums over the particles of one cell, by Gauss point and material.
+struct Scratch {
+    /// Kernel-weighted volume, index `9 m + g`.
+    weight: Vec<f64>,
+    texture: Vec<Texture>,
+    /// Per material.
+    volume: Vec<f64>,
+    log_viscosity: Vec<LinearFit>,
+    density: Vec<LinearFit>,
+}
+
+impl Scratch {
+    fn new(materials: usize) -> Self {
+        Scratch {
+            weight: vec![0.0; 9 * materials],
+            texture: vec![Texture::default(); 9 * materials],
+            volume: vec![0.0; materials],
+            log_viscosity: vec![LinearFit::default(); materials],
+            density: vec![LinearFit::default(); materials],
+        }
+    }
+
+    fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
+        self.weight.fill(0.0);
+        self.texture.fill(Texture::default());
+        self.volume.fill(0.0);
+        self.log_viscosity.fill(LinearFit::default());
+        self.density.fill(LinearFit::default());
+        for p in particles.of_cell(cell) {
+            let m = particles.material[p] as usize;
+            let volume = particles.volume[p];
+            let r = mesh.to_reference(cell, particles.position[p]);
+            let kernel = |t: f64, g: f64| {
+                let q = 0.5 * (t - g) / KERNEL_WIDTH;
+                (-q * q).exp()
+            };
+            let kx = GAUSS_3.map(|g| kernel(r[0], g));
+            let ky = GAUSS_3.map(|g| kernel(r[1], g));
+            self.volume[m] += volume;
+            for g in 0..9 {
+                let w = volume * kx[g % 3] * ky[g / 3];
+                self.weight[9 * m + g] += w;
+                if let (Some(d), Some(_)) = (&particles.director, materials[m].layer_viscosity) {
+                    self.texture[9 * m + g].add(w, d[p]);
+                }
+            }
+            if let (Some(v), true) = (&particles.viscosity, materials[m].carries_viscosity) {
+                self.log_viscosity[m].add(volume, r, v[p].ln());
+            }
+            if let (Some(d), true) = (&particles.density, materials[m].carries_density) {
+                self.density[m].add(volume, r, d[p]);
+            }
+        }
+    }
+
+    /// Fills the nine points and the cell's fractions; mean viscosity and mean 1/B.
+    fn evaluate(
+        &mut self,
+        points: &mut [IntegrationPoint],
+        fractions: &mut [f64],
+        materials: &[Material],
+    ) -> (f64, f64) {
+        let viscosity_fit: Vec<_> = self.log_viscosity.iter().map(LinearFit::solve).collect();
+        let density_fit: Vec<_> = self.density.iter().map(LinearFit::solve).collect();
+        fractions.fill(0.0);
+        let (mut mean_viscosity, mut compliance) = (0.0, 0.0);
+        for (g, point) in points.iter_mut().enumerate() {
+            let total: f64 = (0..materials.len()).map(|m| self.weight[9 * m + g]).sum();
+            let mut mixture = Mixture::default();
+            point.density = 0.0;
+            for (m, material) in materials.iter().enumerate() {
+                let phi = self.weight[9 * m + g] / total;
+                if phi == 0.0 {
+                    continue;
+                }
+                let eta = match &viscosity_fit[m] {
+                    Some(fit) if material.carries_viscosity => fit.at_clipped(point.r).exp(),
+                    _ => material.viscosity,
+                };
+                let density = match &density_fit[m] {
+                    Some(fit) if material.carries_density => fit.at(point.r),
+                    _ => material.density,
+                };
+                mixture.add(phi, &material.law(eta, &self.texture[9 * m + g]));
+                point.density += phi * density;
+                fractions[m] += point.weight * phi;
+                mean_viscosity += point.weight * phi * eta;
+                compliance += point.weight * phi * material.compliance;
+            }
+            point.law = mixture.law();
+        }
+        // The kernel's fractions differ a little from the particles' volumes: mend the mean of the
+        // density, so that a cell weighs what its particles weigh.
+        let volume: f64 = self.volume.iter().sum();
+        let missing: f64 = materials
+            .iter()
+            .enumerate()
+            .map(|(m, material)| {
+                let density = match &density_fit[m] {
+                    Some(fit) if material.carries_density => fit.mean,
+                    _ => material.density,
+                };
+                (self.volume[m] / volume - fractions[m]) * density
+            })
+            .sum();
+        for point in points {
+            point.density += missing;
+        }
+        (mean_viscosity, compliance)
+    }
+}
+
+/// Weighted least squares of `a + b xi + c eta` over the particles of a material in a cell.
+#[derive(Clone, Copy, Default)]
+struct LinearFit {
+    count: u32,
+    /// Sums of w, w xi, w eta, w xi^2, w xi eta, w eta^2.
+    moment: [f64; 6],
+    /// Sums of w f, w f xi, w f eta.
+    value: [f64; 3],
+    low: f64,
+    high: f64,
+}
+
+struct Fitted {
+    coefficient: [f64; 3],
+    mean: f64,
+    low: f64,
+    high: f64,
+}
+
+impl LinearFit {
+    fn add(&mut self, w: f64, r: [f64; 2], f: f64) {
+        let [x, y] = r;
+        for (s, v) in self.moment.iter_mut().zip([1.0, x, y, x * x, x * y, y * y]) {
+            *s += w * v;
+        }
+        for (s, v) in self.value.iter_mut().zip([1.0, x, y]) {
+            *s += w * f * v;
+        }
+        if self.count == 0 {
+            (self.low, self.high) = (f, f);
+        }
+        self.low = self.low.min(f);
+        self.high = self.high.max(f);
+        self.count += 1;
+    }
+
+    /// `None` without particles; a constant where they do not determine a slope.
+    fn solve(&self) -> Option<Fitted> {
+        if self.count == 0 {
+            return None;
+        }
+        let [w, x, y, xx, xy, yy] = self.moment;
+        let mean = self.value[0] / w;
+        // Slopes from central moments.
+        let (cx, cy) = (x / w, y / w);
+        let (sxx, sxy, syy) = (xx / w - cx * cx, xy / w - cx * cy, yy / w - cy * cy);
+        let (fx, fy) = (self.value[1] / w - mean * cx, self.value[2] / w - mean * cy);
+        let det = sxx * syy - sxy * sxy;
+        let (b, c) = if self.count >= 3 && det > 1e-3 * (sxx + syy).powi(2) && sxx + syy > 1e-4 {
+            ((fx * syy - fy * sxy) / det, (fy * sxx - fx * sxy) / det)
+        } else {
+            (0.0, 0.0)
+        };
+        let coefficient = [mean - b * cx - c * cy, b, c];
+        Some(Fitted { coefficient, mean, low: self.low, high: self.high })
+    }
+}
+
+impl Fitted {
+    fn at(&self, r: [f64; 2]) -> f64 {
+        self.coefficient[0] + self.coefficient[1] * r[0] + self.coefficient[2] * r[1]
+    }
+    fn at_clipped(&self, r: [f64; 2]) -> f64 {
+        self.at(r).clamp(self.low, self.high)
+    }
+}

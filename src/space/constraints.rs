@@ -1,0 +1,97 @@
+//! Boundary conditions as the solver sees them: given nodal values, and what has no unique answer.
+
+use super::flow::Flow;
+use super::mesh::Mesh;
+use super::shape::{GAUSS_3X3, NODES};
+
+/// Given values of nodal unknowns, and the null spaces that remain.
+#[derive(Clone, Debug)]
+pub struct Constraints<const D: usize> {
+    fixed: Vec<[bool; D]>,
+    value: Vec<[f64; D]>,
+    /// Directions in which the whole may drift: one node is held, then the mean is removed.
+    free_translation: [bool; 2],
+    /// No boundary lets fluid out: only pressure differences are known.
+    closed: bool,
+}
+
+impl<const D: usize> Constraints<D> {
+    pub fn new(mesh: &Mesh) -> Self {
+        Constraints {
+            fixed: vec![[false; D]; mesh.nodes()],
+            value: vec![[0.0; D]; mesh.nodes()],
+            free_translation: [false; 2],
+            closed: false,
+        }
+    }
+
+    /// Prescribes component `c` of a node unless an earlier call did; earlier wins.
+    pub fn fix(&mut self, node: usize, c: usize, value: f64) {
+        if !self.fixed[node][c] {
+            self.fixed[node][c] = true;
+            self.value[node][c] = value;
+        }
+    }
+    pub fn is_fixed(&self, node: usize, c: usize) -> bool {
+        self.fixed[node][c]
+    }
+    pub fn fixed_value(&self, node: usize, c: usize) -> Option<f64> {
+        self.fixed[node][c].then_some(self.value[node][c])
+    }
+
+    /// Declares that nothing holds component `c`: its mean velocity will be zero.
+    pub fn free_translation(&mut self, mesh: &Mesh, c: usize) {
+        let node = (0..mesh.cells())
+            .find(|&cell| !mesh.solid[cell])
+            .map_or(0, |cell| mesh.cell_nodes(cell)[0]);
+        self.fix(node, c, 0.0);
+        self.free_translation[c] = true;
+    }
+    /// Declares that the pressure is known up to a constant.
+    pub fn close(&mut self) {
+        self.closed = true;
+    }
+
+    pub fn impose(&self, velocity: &mut [[f64; D]]) {
+        for ((u, fixed), value) in velocity.iter_mut().zip(&self.fixed).zip(&self.value) {
+            for c in 0..D {
+                if fixed[c] {
+                    u[c] = value[c];
+                }
+            }
+        }
+    }
+
+    pub fn clear_fixed(&self, force: &mut [[f64; D]]) {
+        for (f, fixed) in force.iter_mut().zip(&self.fixed) {
+            for c in 0..D {
+                if fixed[c] {
+                    f[c] = 0.0;
+                }
+            }
+        }
+    }
+
+    /// Mean velocity zero where the whole may drift, mean pressure zero where it floats.
+    pub fn remove_null_space(&self, mesh: &Mesh, flow: &mut Flow<D>) {
+        let cells = || (0..mesh.cells()).filter(|&c| !mesh.solid[c]);
+        let area: f64 = cells().map(|c| mesh.cell_area(c)).sum();
+        for c in (0..2).filter(|&c| self.free_translation[c]) {
+            let mut mean = 0.0;
+            for cell in cells() {
+                let u = flow.of_cell(mesh, cell);
+                let inside: f64 = GAUSS_3X3
+                    .iter()
+                    .map(|g| g.weight * (0..NODES).map(|a| g.shape.n[a] * u[a][c]).sum::<f64>())
+                    .sum();
+                mean += inside * mesh.cell_area(cell) / area;
+            }
+            flow.velocity.iter_mut().for_each(|u| u[c] -= mean);
+        }
+        if self.closed {
+            let mean: f64 =
+                cells().map(|c| flow.pressure[c][0] * mesh.cell_area(c)).sum::<f64>() / area;
+            cells().for_each(|c| flow.pressure[c][0] -= mean);
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! The unknowns: velocity (and rotation) at nodes, pressure in cells, and their interpolation.
+
+use super::mesh::Mesh;
+use super::shape::{NODES, Shape};
+use nalgebra::Matrix2;
+
+/// Velocity (and rotation) at the mesh's nodes, pressure in its cells.
+#[derive(Clone, Debug)]
+pub struct Flow<const D: usize> {
+    /// `u, v` (and `w`) per node.
+    pub velocity: Vec<[f64; D]>,
+    /// Coefficients of `1, xi, eta` per cell.
+    pub pressure: Vec<[f64; 3]>,
+}
+
+impl<const D: usize> Flow<D> {
+    pub fn zero(mesh: &Mesh) -> Self {
+        Flow { velocity: vec![[0.0; D]; mesh.nodes()], pressure: vec![[0.0; 3]; mesh.cells()] }
+    }
+
+    pub fn of_cell(&self, mesh: &Mesh, cell: usize) -> [[f64; D]; NODES] {
+        mesh.cell_nodes(cell).map(|n| self.velocity[n])
+    }
+
+    /// Velocity (and rotation) at a point.
+    pub fn at(&self, mesh: &Mesh, p: [f64; 2]) -> [f64; D] {
+        let cell = mesh.locate(p);
+        interpolate(&self.of_cell(mesh, cell), &Shape::values(mesh.to_reference(cell, p)))
+    }
+
+    /// Velocity gradient `L_ij = u_i,j` at a point.
+    pub fn gradient_at(&self, mesh: &Mesh, p: [f64; 2]) -> Matrix2<f64> {
+        let cell = mesh.locate(p);
+        let nodal = self.of_cell(mesh, cell).map(|u| [u[0], u[1]]);
+        gradient(&nodal, &Shape::at(mesh.to_reference(cell, p)), mesh.cell_size(cell))
+    }
+
+    pub fn pressure_at(&self, mesh: &Mesh, p: [f64; 2]) -> f64 {
+        let cell = mesh.locate(p);
+        let [xi, eta] = mesh.to_reference(cell, p);
+        let [a, b, c] = self.pressure[cell];
+        a + b * xi + c * eta
+    }
+
+    /// The velocity alone, for what moves with it.
+    pub fn translation(&self) -> Vec<[f64; 2]> {
+        self.velocity.iter().map(|u| [u[0], u[1]]).collect()
+    }
+
+    pub fn max_speed(&self) -> f64 {
+        self.velocity.iter().map(|u| u[0].hypot(u[1])).fold(0.0, f64::max)
+    }
+}
+
+/// Sum of nodal values weighted by shape functions.
+pub fn interpolate<const D: usize>(nodal: &[[f64; D]; NODES], n: &[f64; NODES]) -> [f64; D] {
+    let mut out = [0.0; D];
+    for a in 0..NODES {
+        for c in 0..D {
+            out[c] += n[a] * nodal[a][c];
+        }
+    }
+    out
+}
+
+/// `L_ij = u_i,j` in a cell of size `[hx, hy]`.
+pub fn gradient(nodal: &[[f64; 2]; NODES], s: &Shape, [hx, hy]: [f64; 2]) -> Matrix2<f64> {
+    let mut l = Matrix2::zeros();
+    for a in 0..NODES {
+        for c in 0..2 {
+            l[(c, 0)] += s.d_xi[a] * nodal[a][c] * 2.0 / hx;
+            l[(c, 1)] += s.d_eta[a] * nodal[a][c] * 2.0 / hy;
+        }
+    }
+    l
+}

@@ -1,0 +1,187 @@
+//! The fixed tensor-product mesh: two axes of mesh lines, nodes of the biquadratic element, cells.
+
+/// Mesh lines along one direction, ascending; a periodic axis joins its last line to its first.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    lines: Vec<f64>,
+    periodic: bool,
+    /// For uniform bins over the axis, the cell at the bin's start.
+    bins: Vec<u32>,
+    bins_per_length: f64,
+}
+
+impl Axis {
+    /// `lines`: at least two, strictly ascending.
+    pub fn new(lines: Vec<f64>, periodic: bool) -> Self {
+        debug_assert!(lines.len() >= 2 && lines.windows(2).all(|w| w[0] < w[1]));
+        let length = lines[lines.len() - 1] - lines[0];
+        let count = 4 * (lines.len() - 1);
+        let bins_per_length = count as f64 / length;
+        let mut bins = Vec::with_capacity(count + 1);
+        let mut cell = 0;
+        for b in 0..=count {
+            let start = lines[0] + b as f64 / bins_per_length;
+            while cell + 2 < lines.len() && lines[cell + 1] <= start {
+                cell += 1;
+            }
+            bins.push(cell as u32);
+        }
+        Axis { lines, periodic, bins, bins_per_length }
+    }
+
+    pub fn lines(&self) -> &[f64] {
+        &self.lines
+    }
+    pub fn periodic(&self) -> bool {
+        self.periodic
+    }
+    pub fn start(&self) -> f64 {
+        self.lines[0]
+    }
+    pub fn end(&self) -> f64 {
+        self.lines[self.lines.len() - 1]
+    }
+    pub fn length(&self) -> f64 {
+        self.end() - self.start()
+    }
+    pub fn cells(&self) -> usize {
+        self.lines.len() - 1
+    }
+    /// Nodes of the quadratic element: mesh lines and midpoints.
+    pub fn nodes(&self) -> usize {
+        2 * self.cells() + usize::from(!self.periodic)
+    }
+    pub fn size(&self, cell: usize) -> f64 {
+        self.lines[cell + 1] - self.lines[cell]
+    }
+    pub fn node_coordinate(&self, node: usize) -> f64 {
+        if node % 2 == 0 {
+            self.lines[node / 2]
+        } else {
+            0.5 * (self.lines[node / 2] + self.lines[node / 2 + 1])
+        }
+    }
+    /// Node `a` (0, 1, 2) of a cell.
+    pub fn cell_node(&self, cell: usize, a: usize) -> usize {
+        let node = 2 * cell + a;
+        if self.periodic && node == 2 * self.cells() { 0 } else { node }
+    }
+
+    /// Cell that holds a coordinate; coordinates outside go to the nearest cell, one on a line
+    /// to the cell above it.
+    pub fn locate(&self, x: f64) -> usize {
+        let b = ((x - self.lines[0]) * self.bins_per_length) as usize;
+        let mut cell = self.bins[b.min(self.bins.len() - 1)] as usize;
+        while cell > 0 && x < self.lines[cell] {
+            cell -= 1;
+        }
+        while cell + 2 < self.lines.len() && x >= self.lines[cell + 1] {
+            cell += 1;
+        }
+        cell
+    }
+
+    /// Brings a coordinate of a periodic axis back into it.
+    pub fn wrap(&self, x: f64) -> f64 {
+        if !self.periodic || (x >= self.start() && x < self.end()) {
+            return x;
+        }
+        let wrapped = self.start() + (x - self.start()).rem_euclid(self.length());
+        if wrapped < self.end() { wrapped } else { self.start() }
+    }
+
+    /// Index of the mesh line nearest to a coordinate.
+    pub fn nearest_line(&self, x: f64) -> usize {
+        let after = self.lines.partition_point(|&l| l < x).min(self.lines.len() - 1);
+        if after > 0 && x - self.lines[after - 1] < self.lines[after] - x { after - 1 } else { after }
+    }
+}
+
+/// Tensor-product mesh of rectangles. Cell `(i, j)` has index `j nx + i`.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    pub x: Axis,
+    pub y: Axis,
+    /// Cells that are solid blocks; they carry nothing.
+    pub solid: Vec<bool>,
+}
+
+impl Mesh {
+    pub fn new(x: Axis, y: Axis) -> Self {
+        let solid = vec![false; x.cells() * y.cells()];
+        Mesh { x, y, solid }
+    }
+
+    pub fn cells(&self) -> usize {
+        self.x.cells() * self.y.cells()
+    }
+    pub fn nodes(&self) -> usize {
+        self.x.nodes() * self.y.nodes()
+    }
+    pub fn cell(&self, i: usize, j: usize) -> usize {
+        j * self.x.cells() + i
+    }
+    /// Column and row of a cell.
+    pub fn cell_ij(&self, cell: usize) -> (usize, usize) {
+        (cell % self.x.cells(), cell / self.x.cells())
+    }
+    pub fn node(&self, i: usize, j: usize) -> usize {
+        j * self.x.nodes() + i
+    }
+    pub fn node_position(&self, node: usize) -> [f64; 2] {
+        let (i, j) = (node % self.x.nodes(), node / self.x.nodes());
+        [self.x.node_coordinate(i), self.y.node_coordinate(j)]
+    }
+    /// The nine nodes of a cell, row by row from below; the fifth is the centre.
+    pub fn cell_nodes(&self, cell: usize) -> [usize; 9] {
+        let (i, j) = self.cell_ij(cell);
+        std::array::from_fn(|a| self.node(self.x.cell_node(i, a % 3), self.y.cell_node(j, a / 3)))
+    }
+    pub fn cell_size(&self, cell: usize) -> [f64; 2] {
+        let (i, j) = self.cell_ij(cell);
+        [self.x.size(i), self.y.size(j)]
+    }
+    pub fn cell_area(&self, cell: usize) -> f64 {
+        let [hx, hy] = self.cell_size(cell);
+        hx * hy
+    }
+    pub fn cell_centre(&self, cell: usize) -> [f64; 2] {
+        let (i, j) = self.cell_ij(cell);
+        [self.x.node_coordinate(2 * i + 1), self.y.node_coordinate(2 * j + 1)]
+    }
+    pub fn locate(&self, p: [f64; 2]) -> usize {
+        self.cell(self.x.locate(p[0]), self.y.locate(p[1]))
+    }
+    /// Reference coordinates of a point in a cell, each -1 to 1 inside it.
+    pub fn to_reference(&self, cell: usize, p: [f64; 2]) -> [f64; 2] {
+        let [cx, cy] = self.cell_centre(cell);
+        let [hx, hy] = self.cell_size(cell);
+        [2.0 * (p[0] - cx) / hx, 2.0 * (p[1] - cy) / hy]
+    }
+    pub fn from_reference(&self, cell: usize, r: [f64; 2]) -> [f64; 2] {
+        let [cx, cy] = self.cell_centre(cell);
+        let [hx, hy] = self.cell_size(cell);
+        [cx + 0.5 * hx * r[0], cy + 0.5 * hy * r[1]]
+    }
+    pub fn wrap(&self, p: [f64; 2]) -> [f64; 2] {
+        [self.x.wrap(p[0]), self.y.wrap(p[1])]
+    }
+    /// The up to four neighbours across faces, periodic ones included.
+    pub fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
+        let (i, j) = self.cell_ij(cell);
+        let step = |axis: &Axis, k: usize, up: bool| match (up, axis.periodic) {
+            (true, _) if k + 1 < axis.cells() => Some(k + 1),
+            (true, true) => Some(0),
+            (false, _) if k > 0 => Some(k - 1),
+            (false, true) => Some(axis.cells() - 1),
+            _ => None,
+        };
+        [false, true].into_iter().flat_map(move |up| {
+            [
+                step(&self.x, i, up).map(|i| self.cell(i, j)),
+                step(&self.y, j, up).map(|j| self.cell(i, j)),
+            ]
+        })
+        .flatten()
+    }
+}

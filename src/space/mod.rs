@@ -1,0 +1,11 @@
+//! Where things are: mesh, shape functions, elimination order, boundary conditions, particles.
+
+pub mod constraints;
+pub mod flow;
+pub mod mesh;
+pub mod numbering;
+pub mod particles;
+pub mod population;
+pub mod seeding;
+pub mod shape;
+pub mod walls;

@@ -1,0 +1,140 @@
+//! Particles: structure of arrays, kept sorted by cell. Columns that no effect needs are absent.
+
+use super::mesh::Mesh;
+
+/// A column that exists only when an effect calls for it.
+pub type Column<T> = Option<Vec<T>>;
+
+/// Material points.
+#[derive(Clone, Debug, Default)]
+pub struct Particles {
+    pub position: Vec<[f64; 2]>,
+    /// Area each particle stands for.
+    pub volume: Vec<f64>,
+    /// Index into the plan's materials.
+    pub material: Vec<u8>,
+    /// Unit directors of layered materials.
+    pub director: Column<[f64; 2]>,
+    /// Viscosity carried from an initial field.
+    pub viscosity: Column<f64>,
+    /// Density carried from an initial field.
+    pub density: Column<f64>,
+    /// Marked by a dye line at the start.
+    pub mark: Column<bool>,
+    /// First particle of each cell, one more at the end; valid after [`Particles::sort`].
+    pub cell_start: Vec<u32>,
+}
+
+/// Runs a block for each optional column that exists.
+macro_rules! for_columns {
+    ($p:expr, |$c:ident| $body:expr) => {{
+        let p = $p;
+        {
+            let $c = &mut p.position;
+            $body
+        }
+        {
+            let $c = &mut p.volume;
+            $body
+        }
+        {
+            let $c = &mut p.material;
+            $body
+        }
+        if let Some($c) = &mut p.director {
+            $body
+        }
+        if let Some($c) = &mut p.viscosity {
+            $body
+        }
+        if let Some($c) = &mut p.density {
+            $body
+        }
+        if let Some($c) = &mut p.mark {
+            $body
+        }
+    }};
+}
+
+impl Particles {
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// Particles of a cell; valid after [`Particles::sort`].
+    pub fn of_cell(&self, cell: usize) -> std::ops::Range<usize> {
+        self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize
+    }
+
+    /// Appends a copy of particle `p`.
+    pub fn duplicate(&mut self, p: usize) {
+        for_columns!(self, |c| {
+            let v = c[p];
+            c.push(v);
+        });
+    }
+
+    /// Removes the particles for which `gone` is set, keeping the order of the others.
+    pub fn remove(&mut self, gone: &[bool]) {
+        for_columns!(self, |c| {
+            let mut i = 0;
+            c.retain(|_| {
+                i += 1;
+                !gone[i - 1]
+            });
+        });
+    }
+
+    /// Sorts by cell (stable counting sort) and fills `cell_start`.
+    pub fn sort(&mut self, mesh: &Mesh) {
+        let cells: Vec<u32> = self.position.iter().map(|&p| mesh.locate(p) as u32).collect();
+        self.cell_start.clear();
+        self.cell_start.resize(mesh.cells() + 1, 0);
+        for &c in &cells {
+            self.cell_start[c as usize + 1] += 1;
+        }
+        for c in 0..mesh.cells() {
+            self.cell_start[c + 1] += self.cell_start[c];
+        }
+        if cells.windows(2).all(|w| w[0] <= w[1]) {
+            return;
+        }
+        let mut next = self.cell_start.clone();
+        let mut order = vec![0u32; cells.len()];
+        for (p, &c) in cells.iter().enumerate() {
+            order[next[c as usize] as usize] = p as u32;
+            next[c as usize] += 1;
+        }
+        for_columns!(&mut *self, |c| *c = order.iter().map(|&p| c[p as usize]).collect());
+    }
+
+    /// Total volume of each of `materials` materials.
+    pub fn volumes(&self, materials: usize) -> Vec<f64> {
+        let mut total = vec![0.0; materials];
+        for (m, v) in self.material.iter().zip(&self.volume) {
+            total[*m as usize] += v;
+        }
+        total
+    }
+
+    /// Names and bytes per particle of the columns that exist.
+    pub fn columns(&self) -> Vec<(&'static str, usize)> {
+        let mut list = vec![("position", 16), ("volume", 8), ("material", 1)];
+        if self.director.is_some() {
+            list.push(("director", 16));
+        }
+        if self.viscosity.is_some() {
+            list.push(("viscosity", 8));
+        }
+        if self.density.is_some() {
+            list.push(("density", 8));
+        }
+        if self.mark.is_some() {
+            list.push(("mark", 1));
+        }
+        list
+    }
+}

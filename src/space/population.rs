@@ -1,0 +1,306 @@
+//! Population control: no cell of a particle material runs empty or overfull.
+//!
+//! A cell that lacks particles, or has none in one of its quadrants, splits the particle nearest
+//! to the gap: the child takes half of its volume. An overfull cell merges its closest pairs of
+//! one material. Volume is kept material by material; directors are averaged as axes. The
+//! background carries no history, so it has particles only in a band around other materials:
+//! outside it they are dropped, and a cell that enters the band is filled anew.
+
+use super::mesh::Mesh;
+use super::particles::Particles;
+use super::seeding::Seeding;
+use crate::laws::director;
+
+/// What was done, added up over a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Count {
+    pub splits: u64,
+    pub merges: u64,
+    /// Background particles placed in or removed from the band.
+    pub reseeded: u64,
+    /// Particles held back at walls that their step would have crossed.
+    pub held: u64,
+    /// Particles that left through an open side.
+    pub left: u64,
+    /// Empty cells refilled from a neighbour.
+    pub healed: u64,
+}
+
+/// Bounds on the number of particles per cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Population {
+    pub seeding: Seeding,
+    pub background: Option<u8>,
+    /// Width of the background's band in cells.
+    pub band: usize,
+}
+
+impl Population {
+    /// Restores the bounds. `particles` must be sorted, and are sorted on return.
+    pub fn control(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
+        if let Some(background) = self.background {
+            self.follow_band(mesh, particles, background, count);
+        }
+        self.merge(mesh, particles, count);
+        self.split(mesh, particles, count);
+    }
+
+    fn target(&self) -> usize {
+        self.seeding.count()
+    }
+
+    /// Cells within `band` cells of one that holds a particle of another material.
+    pub fn band_cells(&self, mesh: &Mesh, particles: &Particles, background: u8) -> Vec<bool> {
+        let mut near: Vec<bool> = (0..mesh.cells())
+            .map(|c| particles.material[particles.of_cell(c)].iter().any(|&m| m != background))
+            .collect();
+        for _ in 0..self.band {
+            // Two sweeps, so that diagonal neighbours are reached.
+            for axis in 0..2 {
+                let before = near.clone();
+                for c in (0..mesh.cells()).filter(|&c| before[c]) {
+                    let (i, j) = mesh.cell_ij(c);
+                    for n in mesh.neighbours(c) {
+                        let (ni, nj) = mesh.cell_ij(n);
+                        if (axis == 0 && nj == j) || (axis == 1 && ni == i) {
+                            near[n] = true;
+                        }
+                    }
+                }
+            }
+        }
+        near
+    }
+
+    fn follow_band(
+        &self,
+        mesh: &Mesh,
+        particles: &mut Particles,
+        background: u8,
+        count: &mut Count,
+    ) {
+        let near = self.band_cells(mesh, particles, background);
+        let mut gone = vec![false; particles.len()];
+        let mut any = false;
+        for c in (0..mesh.cells()).filter(|&c| !near[c]) {
+            for p in particles.of_cell(c) {
+                gone[p] = true;
+                any = true;
+            }
+        }
+        let empty: Vec<usize> = (0..mesh.cells())
+            .filter(|&c| near[c] && !mesh.solid[c] && particles.of_cell(c).is_empty())
+            .collect();
+        if any {
+            count.reseeded += gone.iter().filter(|&&g| g).count() as u64;
+            particles.remove(&gone);
+        }
+        for &cell in &empty {
+            self.fill(mesh, particles, cell, background);
+            count.reseeded += self.target() as u64;
+        }
+        if any || !empty.is_empty() {
+            particles.sort(mesh);
+        }
+    }
+
+    /// Fills a cell with background particles.
+    pub fn fill(&self, mesh: &Mesh, particles: &mut Particles, cell: usize, background: u8) {
+        let volume = mesh.cell_area(cell) / self.target() as f64;
+        for p in self.seeding.positions(mesh, cell, &mut self.seeding.random(cell)) {
+            particles.push(p, volume, background);
+        }
+    }
+
+    fn split(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
+        let before = particles.len();
+        let least = (self.target() / 2).max(1);
+        let mut emptied = Vec::new();
+        for cell in 0..mesh.cells() {
+            let mut members: Vec<usize> = particles.of_cell(cell).collect();
+            if members.is_empty() {
+                if self.background.is_none() && !mesh.solid[cell] {
+                    emptied.push(cell);
+                }
+                continue;
+            }
+            let nominal = mesh.cell_area(cell) / self.target() as f64;
+            while let Some(gap) = self.gap(mesh, particles, cell, &members, least) {
+                let parent = nearest(mesh, particles, cell, &members, gap, 0.25 * nominal);
+                particles.volume[parent] *= 0.5;
+                particles.duplicate(parent);
+                let child = particles.len() - 1;
+                particles.position[child] = mesh.from_reference(cell, gap);
+                members.push(child);
+                count.splits += 1;
+            }
+        }
+        for cell in emptied {
+            count.healed += u64::from(heal(mesh, particles, cell));
+        }
+        if particles.len() != before {
+            particles.sort(mesh);
+        }
+    }
+
+    /// A place (reference coordinates) that lacks a particle: in an empty quadrant, or, where
+    /// the cell has too few, the lattice point farthest from all.
+    fn gap(
+        &self,
+        mesh: &Mesh,
+        particles: &Particles,
+        cell: usize,
+        members: &[usize],
+        least: usize,
+    ) -> Option<[f64; 2]> {
+        let places: Vec<[f64; 2]> =
+            members.iter().map(|&p| mesh.to_reference(cell, particles.position[p])).collect();
+        if self.target() >= 4 {
+            let mut quadrants = [0; 4];
+            for r in &places {
+                quadrants[usize::from(r[0] > 0.0) + 2 * usize::from(r[1] > 0.0)] += 1;
+            }
+            if let Some(q) = quadrants.iter().position(|&n| n == 0) {
+                return Some([(q % 2) as f64 - 0.5, (q / 2) as f64 - 0.5]);
+            }
+        }
+        if members.len() >= least {
+            return None;
+        }
+        let lattice = (0..16).map(|k| [-0.75 + 0.5 * (k % 4) as f64, -0.75 + 0.5 * (k / 4) as f64]);
+        let clearance = |g: &[f64; 2]| {
+            places
+                .iter()
+                .map(|r| (r[0] - g[0]).powi(2) + (r[1] - g[1]).powi(2))
+                .fold(f64::INFINITY, f64::min)
+        };
+        lattice.max_by(|a, b| clearance(a).total_cmp(&clearance(b)))
+    }
+
+    fn merge(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
+        let most = 2 * self.target() + 4;
+        let mut gone = vec![false; particles.len()];
+        let mut any = false;
+        for cell in 0..mesh.cells() {
+            let mut members: Vec<usize> = particles.of_cell(cell).collect();
+            while members.len() > most {
+                let Some((a, b)) = closest_pair(mesh, particles, cell, &members) else { break };
+                particles.absorb(a, b);
+                gone[b] = true;
+                any = true;
+                members.retain(|&p| p != b);
+                count.merges += 1;
+            }
+        }
+        if any {
+            particles.remove(&gone);
+            particles.sort(mesh);
+        }
+    }
+}
+
+/// The member nearest to a place among those of at least `least_volume`; failing that, the
+/// largest.
+fn nearest(
+    mesh: &Mesh,
+    particles: &Particles,
+    cell: usize,
+    members: &[usize],
+    place: [f64; 2],
+    least_volume: f64,
+) -> usize {
+    let distance = |p: usize| {
+        let r = mesh.to_reference(cell, particles.position[p]);
+        (r[0] - place[0]).powi(2) + (r[1] - place[1]).powi(2)
+    };
+    let by_volume = |a: &&usize, b: &&usize| particles.volume[**a].total_cmp(&particles.volume[**b]);
+    members
+        .iter()
+        .filter(|&&p| particles.volume[p] >= least_volume)
+        .min_by(|&&a, &&b| distance(a).total_cmp(&distance(b)))
+        .or_else(|| members.iter().max_by(by_volume))
+        .copied()
+        .unwrap_or(members[0])
+}
+
+/// The two members of one kind that cost least to merge: close and small.
+fn closest_pair(
+    mesh: &Mesh,
+    particles: &Particles,
+    cell: usize,
+    members: &[usize],
+) -> Option<(usize, usize)> {
+    let [hx, hy] = mesh.cell_size(cell);
+    let marked = |p: usize| particles.mark.as_ref().is_some_and(|m| m[p]);
+    let mut best = None;
+    for (k, &a) in members.iter().enumerate() {
+        for &b in &members[k + 1..] {
+            if particles.material[a] != particles.material[b] || marked(a) != marked(b) {
+                continue;
+            }
+            let (pa, pb) = (particles.position[a], particles.position[b]);
+            let r2 = ((pa[0] - pb[0]) / hx).powi(2) + ((pa[1] - pb[1]) / hy).powi(2);
+            let (va, vb) = (particles.volume[a], particles.volume[b]);
+            let cost = r2 * va * vb / (va + vb);
+            if best.is_none_or(|(c, _)| cost < c) {
+                best = Some((cost, (a, b)));
+            }
+        }
+    }
+    best.map(|(_, pair)| pair)
+}
+
+/// Refills an empty cell with half of the largest particle of its neighbours.
+fn heal(mesh: &Mesh, particles: &mut Particles, cell: usize) -> bool {
+    let donor = mesh
+        .neighbours(cell)
+        .flat_map(|n| particles.of_cell(n))
+        .max_by(|&a, &b| particles.volume[a].total_cmp(&particles.volume[b]));
+    let Some(donor) = donor else { return false };
+    particles.volume[donor] *= 0.5;
+    particles.duplicate(donor);
+    let child = particles.len() - 1;
+    particles.position[child] = mesh.cell_centre(cell);
+    true
+}
+
+impl Particles {
+    /// Appends a particle of a material that carries nothing of its own.
+    pub fn push(&mut self, position: [f64; 2], volume: f64, material: u8) {
+        self.position.push(position);
+        self.volume.push(volume);
+        self.material.push(material);
+        if let Some(d) = &mut self.director {
+            d.push([0.0, 1.0]);
+        }
+        if let Some(v) = &mut self.viscosity {
+            v.push(0.0);
+        }
+        if let Some(d) = &mut self.density {
+            d.push(0.0);
+        }
+        if let Some(m) = &mut self.mark {
+            m.push(false);
+        }
+    }
+
+    /// Joins particle `b` to `a` (which keeps its place in the list): volumes add up, position
+    /// and carried values are means weighted by volume, directors are averaged as axes.
+    pub fn absorb(&mut self, a: usize, b: usize) {
+        let (va, vb) = (self.volume[a], self.volume[b]);
+        let (fa, fb) = (va / (va + vb), vb / (va + vb));
+        self.volume[a] = va + vb;
+        for c in 0..2 {
+            self.position[a][c] = fa * self.position[a][c] + fb * self.position[b][c];
+        }
+        if let Some(d) = &mut self.director {
+            let [p, q] = [d[a], d[b]];
+            let product = |i: usize, j: usize| fa * p[i] * p[j] + fb * q[i] * q[j];
+            let n = director::axis(product(0, 0), product(1, 1), product(0, 1));
+            d[a] = [n.x, n.y];
+        }
+        for column in [&mut self.viscosity, &mut self.density].into_iter().flatten() {
+            column[a] = fa * column[a] + fb * column[b];
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Biquadratic (Q2) shape functions on the reference cell `[-1, 1]^2` and its Gauss points.
+//!
+//! Node `a` sits at column `a % 3`, row `a / 3`; node 4 is the centre. The pressure basis of a
+//! cell is `1, xi, eta` (discontinuous linear, P1disc), orthogonal on a rectangle:
+//! `integral q_i q_j = area diag(1, 1/3, 1/3)`.
+
+use std::sync::LazyLock;
+
+/// Nodes of the element.
+pub const NODES: usize = 9;
+/// The node at the centre, which no other cell shares.
+pub const CENTRE: usize = 4;
+/// `integral q_i^2 / area` of the pressure basis.
+pub const PRESSURE_MASS: [f64; 3] = [1.0, 1.0 / 3.0, 1.0 / 3.0];
+
+/// Quadratic Lagrange functions at -1, 0, 1 and their derivatives.
+fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {
+    ([0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)], [t - 0.5, -2.0 * t, t + 0.5])
+}
+
+/// Values and reference derivatives of the nine shape functions at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    pub n: [f64; NODES],
+    pub d_xi: [f64; NODES],
+    pub d_eta: [f64; NODES],
+}
+
+impl Shape {
+    pub fn at(r: [f64; 2]) -> Self {
+        let (fx, dx) = quadratic(r[0]);
+        let (fy, dy) = quadratic(r[1]);
+        let mut s = Shape { n: [0.0; NODES], d_xi: [0.0; NODES], d_eta: [0.0; NODES] };
+        for b in 0..3 {
+            for a in 0..3 {
+                let k = 3 * b + a;
+                s.n[k] = fx[a] * fy[b];
+                s.d_xi[k] = dx[a] * fy[b];
+                s.d_eta[k] = fx[a] * dy[b];
+            }
+        }
+        s
+    }
+
+    /// Only the values; what interpolation needs.
+    pub fn values(r: [f64; 2]) -> [f64; NODES] {
+        let (fx, _) = quadratic(r[0]);
+        let (fy, _) = quadratic(r[1]);
+        std::array::from_fn(|k| fx[k % 3] * fy[k / 3])
+    }
+}
+
+/// A Gauss point of the reference cell; weights add up to 1 (multiply by the cell's area).
+#[derive(Clone, Copy, Debug)]
+pub struct GaussPoint {
+    pub r: [f64; 2],
+    pub weight: f64,
+    pub shape: Shape,
+}
+
+/// Abscissae of the three-point rule.
+pub const GAUSS_3: [f64; 3] = [-0.774_596_669_241_483_4, 0.0, 0.774_596_669_241_483_4];
+const GAUSS_3_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
+
+/// The 3 x 3 rule, exact to degree five in each direction, row by row from below.
+pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
+    std::array::from_fn(|g| {
+        let r = [GAUSS_3[g % 3], GAUSS_3[g / 3]];
+        let weight = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3];
+        GaussPoint { r, weight, shape: Shape::at(r) }
+    })
+});
+
+/// Five-point Gauss rule `(abscissa, weight)` on `[-1, 1]`, weights adding up to 1: for loads and
+/// error norms, where 3 x 3 would be the error.
+pub const GAUSS_5: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.118_463_442_528_094_55),
+    (-0.538_469_310_105_683, 0.239_314_335_249_683_23),
+    (0.0, 0.284_444_444_444_444_43),
+    (0.538_469_310_105_683, 0.239_314_335_249_683_23),
+    (0.906_179_845_938_664, 0.118_463_442_528_094_55),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shape_functions_reproduce_quadratics_and_their_gradients() {
+        let f = |x: f64, y: f64| 1.0 + 2.0 * x - y + 3.0 * x * x * y - x * y * y + x * x * y * y;
+        let fx = |x: f64, y: f64| 2.0 + 6.0 * x * y - y * y + 2.0 * x * y * y;
+        let r = [0.37, -0.81];
+        let s = Shape::at(r);
+        let nodal: [f64; 9] =
+            std::array::from_fn(|k| f((k % 3) as f64 - 1.0, (k / 3) as f64 - 1.0));
+        let value: f64 = (0..9).map(|k| s.n[k] * nodal[k]).sum();
+        let slope: f64 = (0..9).map(|k| s.d_xi[k] * nodal[k]).sum();
+        assert!((value - f(r[0], r[1])).abs() < 1e-14);
+        assert!((slope - fx(r[0], r[1])).abs() < 1e-14);
+    }
+
+    #[test]
+    fn gauss_rules_are_exact_to_their_degree() {
+        for degree in 0..=9 {
+            let exact = if degree % 2 == 0 { 1.0 / (degree as f64 + 1.0) } else { 0.0 };
+            let five: f64 = GAUSS_5.iter().map(|(x, w)| w * x.powi(degree)).sum();
+            assert!((five - exact).abs() < 1e-14, "degree {degree}");
+            if degree <= 5 {
+                let three: f64 =
+                    GAUSS_3X3.iter().map(|g| g.weight * g.r[0].powi(degree)).sum();
+                assert!((three - exact).abs() < 1e-14, "degree {degree}");
+            }
+        }
+    }
+}
