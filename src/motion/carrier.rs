@@ -31,26 +31,39 @@ impl Carrier<'_> {
         self.mesh.cell_nodes(cell).map(|n| self.velocity[n])
     }
 
-    /// Explicit midpoint rule from `p` in `cell`.
-    pub fn travel(&self, cell: usize, p: [f64; 2]) -> Journey {
-        let (mesh, dt) = (self.mesh, self.dt);
-        let u = interpolate(&self.nodal(cell), &Shape::values(mesh.to_reference(cell, p)));
-        let half = [p[0] + 0.5 * dt * u[0], p[1] + 0.5 * dt * u[1]];
-        let middle = match self.enclosure.follow(mesh, p, half) {
+    /// Velocity at a place reached from `p`, walls and periodic sides respected, and where it
+    /// is; where the way leaves the domain, that of the start.
+    fn stage(&self, p: [f64; 2], u: [f64; 2], dt: f64) -> ([f64; 2], (usize, [f64; 2])) {
+        let mesh = self.mesh;
+        let goal = [p[0] + dt * u[0], p[1] + dt * u[1]];
+        let place = match self.enclosure.follow(mesh, p, goal) {
             Landing::Free(q) | Landing::Held(q) => mesh.wrap(q),
-            // It will leave; its velocity on the way out is the one it has here.
             Landing::Left => p,
         };
-        let middle_cell = mesh.locate(middle);
-        let r = mesh.to_reference(middle_cell, middle);
-        let u = interpolate(&self.nodal(middle_cell), &Shape::values(r));
-        let to = [p[0] + dt * u[0], p[1] + dt * u[1]];
-        let (to, held) = match self.enclosure.follow(mesh, p, to) {
+        let cell = mesh.locate(place);
+        let r = mesh.to_reference(cell, place);
+        (interpolate(&self.nodal(cell), &Shape::values(r)), (cell, r))
+    }
+
+    /// The classical fourth-order Runge-Kutta rule from `p` in `cell`. The field is frozen at the
+    /// middle of the step, so the order in time is that of the field; the high order in space
+    /// keeps the distances of particles: a midpoint rule changes areas by `(dt |grad u|)^4 / 4`
+    /// a step, this one by `(dt |grad u|)^6 / 72`.
+    pub fn travel(&self, cell: usize, p: [f64; 2]) -> Journey {
+        let dt = self.dt;
+        let k1 =
+            interpolate(&self.nodal(cell), &Shape::values(self.mesh.to_reference(cell, p)));
+        let (k2, _) = self.stage(p, k1, 0.5 * dt);
+        let (k3, middle) = self.stage(p, k2, 0.5 * dt);
+        let (k4, _) = self.stage(p, k3, dt);
+        let mean = |c: usize| (k1[c] + 2.0 * (k2[c] + k3[c]) + k4[c]) / 6.0;
+        let goal = [p[0] + dt * mean(0), p[1] + dt * mean(1)];
+        let (to, held) = match self.enclosure.follow(self.mesh, p, goal) {
             Landing::Free(q) => (Some(q), false),
             Landing::Held(q) => (Some(q), true),
             Landing::Left => (None, false),
         };
-        Journey { to, held, middle: (middle_cell, r) }
+        Journey { to, held, middle }
     }
 
     /// Velocity gradient at the middle of a journey.

@@ -2,6 +2,7 @@
 //! velocity field.
 
 use crate::plan::Gauge;
+use crate::space::balance::Face;
 use crate::space::flow::Flow;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
@@ -48,8 +49,20 @@ impl Counter {
         }
     }
 
+    /// Counts volume that passed between cells through a face.
+    pub fn exchange(&mut self, face: &Face, material: u8, volume: f64) {
+        let g = &self.gauge;
+        let on = face.normal == g.normal
+            && face.at == g.at
+            && face.middle > g.from
+            && face.middle < g.to;
+        if on && material == g.material {
+            self.volume += g.sign * volume;
+        }
+    }
+
     /// Flux of the material along the gauge's direction, from the velocity field; the material
-    /// at a sample is a kernel mean over the particles of the cells on both sides.
+    /// at a sample is a kernel mean over the particles of the cell upstream.
     pub fn rate<const D: usize>(
         &self,
         mesh: &Mesh,
@@ -70,10 +83,9 @@ impl Counter {
         let cell_at = |m: usize, k: usize| if g.normal == 0 { mesh.cell(m, k) } else { mesh.cell(k, m) };
         let mut flux = 0.0;
         for k in first..last {
-            let beside: Vec<usize> =
-                [below, above].into_iter().flatten().map(|m| cell_at(m, k)).collect();
-            let Some(&owner) = beside.last() else { continue };
-            let edge = if above.is_some() { -1.0 } else { 1.0 };
+            let [low, high] = [below, above].map(|m| m.map(|m| cell_at(m, k)));
+            let Some(owner) = high.or(low) else { continue };
+            let edge = if high.is_some() { -1.0 } else { 1.0 };
             let nodal = flow.of_cell(mesh, owner);
             for s in 0..SAMPLES {
                 let t = (2 * s + 1) as f64 / SAMPLES as f64 - 1.0;
@@ -81,7 +93,8 @@ impl Counter {
                 let n = Shape::values(r);
                 let u: f64 = (0..9).map(|a| n[a] * nodal[a][g.normal]).sum();
                 let p = mesh.from_reference(owner, r);
-                let share = fraction(mesh, particles, &beside, p, g.material, background);
+                let upstream = if u > 0.0 { low } else { high }.unwrap_or(owner);
+                let share = fraction(mesh, particles, upstream, p, g.material, background);
                 flux += g.sign * share * u * along.size(k) / SAMPLES as f64;
             }
         }
@@ -89,32 +102,28 @@ impl Counter {
     }
 }
 
-/// Share of a material near a point among the particles of some cells.
+/// Share of a material near a point among the particles of a cell.
 fn fraction(
     mesh: &Mesh,
     particles: &Particles,
-    cells: &[usize],
+    cell: usize,
     p: [f64; 2],
     material: u8,
     background: Option<u8>,
 ) -> f64 {
-    let (mut mine, mut all) = (0.0, 0.0);
-    for &cell in cells {
-        let [hx, hy] = mesh.cell_size(cell);
-        let range = particles.of_cell(cell);
-        if range.is_empty() {
-            // A cell of background: it weighs as a particle at its near edge would.
-            let w = 1e-3;
-            all += w;
-            mine += if background == Some(material) { w } else { 0.0 };
-        }
-        for q in range {
-            let (dx, dy) = (particles.position[q][0] - p[0], particles.position[q][1] - p[1]);
-            let r2 = (dx / hx).powi(2) + (dy / hy).powi(2);
-            let w = particles.volume[q] * (-r2 / (KERNEL_WIDTH * KERNEL_WIDTH)).exp() + 1e-300;
-            all += w;
-            mine += if particles.material[q] == material { w } else { 0.0 };
-        }
+    let range = particles.of_cell(cell);
+    if range.is_empty() {
+        return f64::from(background == Some(material));
     }
-    if all > 0.0 { mine / all } else { 0.0 }
+    let [hx, hy] = mesh.cell_size(cell);
+    let (mut mine, mut all) = (0.0, 0.0);
+    for q in range {
+        let (dx, dy) = (particles.position[q][0] - p[0], particles.position[q][1] - p[1]);
+        let r2 = (dx / hx).powi(2) + (dy / hy).powi(2);
+        // The floor keeps the nearest particles in charge where all are far.
+        let w = particles.volume[q] * ((-r2 / (KERNEL_WIDTH * KERNEL_WIDTH)).exp() + 1e-30);
+        all += w;
+        mine += if particles.material[q] == material { w } else { 0.0 };
+    }
+    mine / all
 }

@@ -4,6 +4,7 @@ use super::clock::{Limiter, Speeds};
 use super::row::{GaugeRow, Phases, Row};
 use super::Simulation;
 use crate::plan::Plan;
+use crate::plan::material::Material;
 use crate::solve::element::{PointShape, Rates};
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
@@ -55,6 +56,19 @@ pub fn hash(p: &Particles) -> String {
     floats(&mut p.density.iter().flatten().copied());
     h.update(&p.material);
     h.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Volume mean of |n_x| over layered particles.
+pub fn mean_alignment(p: &Particles, materials: &[Material]) -> Option<f64> {
+    let directors = p.director.as_ref()?;
+    let (mut sum, mut volume) = (0.0, 0.0);
+    for (k, n) in directors.iter().enumerate() {
+        if materials[p.material[k] as usize].layer_viscosity.is_some() {
+            sum += p.volume[k] * n[0].abs();
+            volume += p.volume[k];
+        }
+    }
+    (volume > 0.0).then(|| sum / volume)
 }
 
 impl<const D: usize> Simulation<D> {

@@ -26,6 +26,7 @@ use crate::scene::Integrator;
 use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};
+use crate::space::balance::Balance;
 use crate::space::flow::Flow;
 use crate::space::particles::Particles;
 use crate::space::population::{Count, Population};
@@ -84,6 +85,9 @@ impl SimError {
     }
 }
 
+/// Sweeps of [`Balance`] per step.
+const BALANCE_SWEEPS: usize = 4;
+
 /// A run at one instant. `D` is 2, or 3 with Cosserat rotation; see [`start`] for the choice.
 pub struct Simulation<const D: usize> {
     plan: Arc<Plan>,
@@ -101,6 +105,7 @@ pub struct Simulation<const D: usize> {
     version: u32,
     next_change: usize,
     population: Population,
+    balance: Balance,
     gauges: Vec<Counter>,
     dye: Option<DyeLines>,
     count: Count,
@@ -129,6 +134,8 @@ pub trait Run: Send {
     fn pressure_at(&self, p: [f64; 2]) -> f64;
     /// What the recording shows of the current state.
     fn picture(&self) -> crate::frame::Picture;
+    /// Volume mean of |n_x| over layered particles; `None` without directors.
+    fn mean_alignment(&self) -> Option<f64>;
     /// SHA-256 over the bits of the particle state.
     fn state_hash(&self) -> String;
     /// Unknowns of the solver: velocity and rotation, pressure.
@@ -182,6 +189,7 @@ impl<const D: usize> Simulation<D> {
             version: 0,
             next_change: 0,
             population,
+            balance: Balance::new(&mesh, &plan.enclosure, plan.state.materials.len()),
             gauges: plan.gauges.iter().cloned().map(Counter::new).collect(),
             dye: plan.tracers.as_ref().map(DyeLines::new),
             count: Count::default(),
@@ -245,6 +253,12 @@ impl<const D: usize> Simulation<D> {
         seconds.motion += phase.elapsed().as_secs_f64();
         let phase = Instant::now();
         self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
+        if !plan.effects.volume_change {
+            let gauges = &mut self.gauges;
+            self.balance.even_out(&plan.mesh, &mut self.particles, BALANCE_SWEEPS, |f, m, v| {
+                gauges.iter_mut().for_each(|g| g.exchange(f, m, v));
+            });
+        }
         seconds.population += phase.elapsed().as_secs_f64();
 
         self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
@@ -426,6 +440,9 @@ impl<const D: usize> Run for Simulation<D> {
     }
     fn picture(&self) -> crate::frame::Picture {
         self.draw()
+    }
+    fn mean_alignment(&self) -> Option<f64> {
+        measure::mean_alignment(&self.particles, &self.matter.materials)
     }
     fn state_hash(&self) -> String {
         measure::hash(&self.particles)

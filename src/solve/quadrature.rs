@@ -19,6 +19,10 @@ use crate::space::shape::{GAUSS_3, GAUSS_3X3, Shape};
 /// Width of the fraction kernel in cells: 0.4 was the best of those measured.
 const KERNEL_WIDTH: f64 = 0.4;
 
+/// Matching of fractions to volumes stops here: far below the noise of the particles.
+const MATCHING_TOLERANCE: f64 = 1e-6;
+const MATCHING_ITERATIONS: usize = 30;
+
 /// One integration point of a cell.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IntegrationPoint {
@@ -322,6 +326,39 @@ impl Scratch {
         }
     }
 
+    /// Turns kernel weights into fractions whose mean over the cell is each material's share of
+    /// the particles' volume: weights of a material are scaled by a common factor, found by
+    /// fixed-point iteration. So a cell weighs what its particles weigh.
+    fn match_volumes(&mut self, points: &[IntegrationPoint], materials: usize) {
+        let volume: f64 = self.volume.iter().sum();
+        let normalise = |weight: &mut [f64]| {
+            for g in 0..9 {
+                let total: f64 = (0..materials).map(|m| weight[9 * m + g]).sum();
+                (0..materials).for_each(|m| weight[9 * m + g] /= total);
+            }
+        };
+        normalise(&mut self.weight);
+        if self.volume.iter().filter(|&&v| v > 0.0).count() < 2 {
+            return;
+        }
+        for _ in 0..MATCHING_ITERATIONS {
+            let mut worst: f64 = 0.0;
+            for m in 0..materials {
+                let share = self.volume[m] / volume;
+                let weight = &mut self.weight[9 * m..9 * m + 9];
+                let mean: f64 = weight.iter().zip(points).map(|(w, p)| w * p.weight).sum();
+                if share > 0.0 && mean > 0.0 {
+                    weight.iter_mut().for_each(|w| *w *= share / mean);
+                    worst = worst.max((share - mean).abs());
+                }
+            }
+            normalise(&mut self.weight);
+            if worst < MATCHING_TOLERANCE {
+                break;
+            }
+        }
+    }
+
     /// Fills the nine points and the cell's fractions; mean viscosity and mean 1/B.
     fn evaluate(
         &mut self,
@@ -331,14 +368,14 @@ impl Scratch {
     ) -> (f64, f64) {
         let viscosity_fit: Vec<_> = self.log_viscosity.iter().map(LinearFit::solve).collect();
         let density_fit: Vec<_> = self.density.iter().map(LinearFit::solve).collect();
+        self.match_volumes(points, materials.len());
         fractions.fill(0.0);
         let (mut mean_viscosity, mut compliance) = (0.0, 0.0);
         for (g, point) in points.iter_mut().enumerate() {
-            let total: f64 = (0..materials.len()).map(|m| self.weight[9 * m + g]).sum();
             let mut mixture = Mixture::default();
             point.density = 0.0;
             for (m, material) in materials.iter().enumerate() {
-                let phi = self.weight[9 * m + g] / total;
+                let phi = self.weight[9 * m + g];
                 if phi == 0.0 {
                     continue;
                 }
@@ -358,23 +395,6 @@ impl Scratch {
             }
             point.law = mixture.law();
         }
-        // The kernel's fractions differ a little from the particles' volumes: mend the mean of the
-        // density, so that a cell weighs what its particles weigh.
-        let volume: f64 = self.volume.iter().sum();
-        let missing: f64 = materials
-            .iter()
-            .enumerate()
-            .map(|(m, material)| {
-                let density = match &density_fit[m] {
-                    Some(fit) if material.carries_density => fit.mean,
-                    _ => material.density,
-                };
-                (self.volume[m] / volume - fractions[m]) * density
-            })
-            .sum();
-        for point in points {
-            point.density += missing;
-        }
         (mean_viscosity, compliance)
     }
 }
@@ -393,7 +413,6 @@ struct LinearFit {
 
 struct Fitted {
     coefficient: [f64; 3],
-    mean: f64,
     low: f64,
     high: f64,
 }
@@ -433,7 +452,7 @@ impl LinearFit {
             (0.0, 0.0)
         };
         let coefficient = [mean - b * cx - c * cy, b, c];
-        Some(Fitted { coefficient, mean, low: self.low, high: self.high })
+        Some(Fitted { coefficient, low: self.low, high: self.high })
     }
 }
 

@@ -1,5 +1,6 @@
 //! Where things are: mesh, shape functions, elimination order, boundary conditions, particles.
 
+pub mod balance;
 pub mod constraints;
 pub mod flow;
 pub mod mesh;

@@ -4,7 +4,8 @@
 //! to the gap: the child takes half of its volume. An overfull cell merges its closest pairs of
 //! one material. Volume is kept material by material; directors are averaged as axes. The
 //! background carries no history, so it has particles only in a band around other materials:
-//! outside it they are dropped, and a cell that enters the band is filled anew.
+//! outside it they are dropped, and cells of the band that hold nothing else are kept full, so
+//! that what flows into cut cells is accounted for.
 
 use super::mesh::Mesh;
 use super::particles::Particles;
@@ -88,28 +89,69 @@ impl Population {
                 any = true;
             }
         }
-        let empty: Vec<usize> = (0..mesh.cells())
-            .filter(|&c| near[c] && !mesh.solid[c] && particles.of_cell(c).is_empty())
-            .collect();
-        if any {
+        let mut changed = false;
+        for c in (0..mesh.cells()).filter(|&c| near[c] && !mesh.solid[c]) {
+            let range = particles.of_cell(c);
+            if particles.material[range.clone()].iter().all(|&m| m == background) {
+                changed |= self.restore(mesh, particles, c, &mut gone, background, count);
+            }
+        }
+        if any || changed {
             count.reseeded += gone.iter().filter(|&&g| g).count() as u64;
+            gone.resize(particles.len(), false);
             particles.remove(&gone);
-        }
-        for &cell in &empty {
-            self.fill(mesh, particles, cell, background);
-            count.reseeded += self.target() as u64;
-        }
-        if any || !empty.is_empty() {
             particles.sort(mesh);
         }
     }
 
-    /// Fills a cell with background particles.
-    pub fn fill(&self, mesh: &Mesh, particles: &mut Particles, cell: usize, background: u8) {
+    /// Brings a cell of background alone back to its full volume: what flows in from cells
+    /// without particles brings none. Fills empty subcells, takes from crowded ones.
+    fn restore(
+        &self,
+        mesh: &Mesh,
+        particles: &mut Particles,
+        cell: usize,
+        gone: &mut [bool],
+        background: u8,
+        count: &mut Count,
+    ) -> bool {
+        let side = self.seeding.side;
         let volume = mesh.cell_area(cell) / self.target() as f64;
-        for p in self.seeding.positions(mesh, cell, &mut self.seeding.random(cell)) {
-            particles.push(p, volume, background);
+        let mut subcells = vec![Vec::new(); self.target()];
+        let mut missing = mesh.cell_area(cell);
+        for p in particles.of_cell(cell) {
+            let r = mesh.to_reference(cell, particles.position[p]);
+            let at = |t: f64| ((0.5 * (t + 1.0) * side as f64) as usize).min(side - 1);
+            subcells[at(r[1]) * side + at(r[0])].push(p);
+            missing -= particles.volume[p];
         }
+        let mut changed = false;
+        for members in subcells.iter_mut() {
+            while members.len() > 1 && missing < -0.5 * volume {
+                let Some(p) = members.pop() else { break };
+                gone[p] = true;
+                missing += particles.volume[p];
+                changed = true;
+            }
+        }
+        for (k, members) in subcells.iter().enumerate() {
+            if members.is_empty() && missing > 0.5 * volume {
+                let at = |k: usize| (2 * k + 1) as f64 / side as f64 - 1.0;
+                let place = mesh.from_reference(cell, [at(k % side), at(k / side)]);
+                particles.push(place, volume, background);
+                missing -= volume;
+                count.reseeded += 1;
+                changed = true;
+            }
+        }
+        // The rest goes to the volumes of all: the cell is full exactly.
+        let kept: Vec<usize> = particles.of_cell(cell).filter(|&p| !gone[p]).collect();
+        let total: f64 = kept.iter().map(|&p| particles.volume[p]).sum();
+        if total > 0.0 {
+            let factor = 1.0 + missing / total;
+            kept.iter().for_each(|&p| particles.volume[p] *= factor);
+        }
+        changed
     }
 
     fn split(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {

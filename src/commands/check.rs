@@ -1,0 +1,23 @@
+//! `grainscope check`: validate a scene and do nothing else.
+
+use super::{Failure, print};
+use crate::sim;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Preset name or path of a TOML file
+    scene: String,
+    /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let source = super::source(&args.scene, &args.sets)?;
+    let (scene, plan) = super::resolve(&source)?;
+    sim::initial::particles(&plan).map_err(sim::SimError::from)?;
+    for w in &plan.warnings {
+        eprintln!("warning: {w}");
+    }
+    print(&format!("{}: ok ({})", source.name(), scene.name))
+}

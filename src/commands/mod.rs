@@ -1,0 +1,190 @@
+//! The command line: the top floor, which nothing imports.
+
+mod check;
+mod plan;
+mod presets;
+mod run;
+
+use crate::record::folder::FolderError;
+use crate::record::plots::PlotError;
+use crate::record::rerun_log::RecordError;
+use crate::scene::{self, Scene, SceneError, SceneSource};
+use crate::sim::SimError;
+use clap::{CommandFactory, Parser, Subcommand};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Exit codes, as documented in `--help`.
+mod code {
+    pub const USAGE: u8 = 2;
+    pub const SCENE: u8 = 3;
+    pub const NOT_CONVERGED: u8 = 4;
+    pub const NON_FINITE: u8 = 5;
+    pub const INTERRUPTED: u8 = 130;
+    /// Files, ports, viewers.
+    pub const ENVIRONMENT: u8 = 1;
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    ok
+  1    a file, folder, port or viewer cannot be used
+  2    usage
+  3    the scene is invalid
+  4    not converged
+  5    not finite
+  6    a comparison differs
+  130  interrupted";
+
+const EXAMPLES: &str = "\
+Examples:
+  grainscope run silo                                   discharge of a silo, recorded
+  grainscope run presets/silo.toml --set alpha=5/3 --out runs/stiff
+  grainscope run shear_alignment --save align.rrd --serve   save and watch at once
+  grainscope plan silo                                  which effects are solved, and why
+  grainscope presets show silo                          the scene as TOML";
+
+/// Look into the flow of grains with microstructure.
+///
+/// An implicit Material Point Method for fluids with an internal length (Cosserat) and an
+/// orientation (director); runs are recorded for the Rerun viewer.
+#[derive(Parser)]
+#[command(version, after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a scene: a preset's name or a TOML file
+    Run(run::Args),
+    /// Say which effects a scene calls for, and what they cost
+    Plan(plan::Args),
+    /// Validate a scene and do nothing else
+    Check(check::Args),
+    /// List the presets, or show one
+    Presets(presets::Args),
+    /// Print the JSON schema of scene files
+    Schema,
+    /// Print completions for a shell
+    Completions { shell: clap_complete::Shell },
+    /// Print the manual page
+    Man,
+}
+
+/// A failed command: what to print, and the exit code.
+#[derive(Debug)]
+pub enum Failure {
+    Scene(Box<SceneError>),
+    Sim(SimError),
+    Environment(String),
+    Usage(String),
+    Interrupted,
+}
+
+impl From<SceneError> for Failure {
+    fn from(e: SceneError) -> Self {
+        Failure::Scene(Box::new(e))
+    }
+}
+impl From<SimError> for Failure {
+    fn from(e: SimError) -> Self {
+        Failure::Sim(e)
+    }
+}
+impl From<RecordError> for Failure {
+    fn from(e: RecordError) -> Self {
+        Failure::Environment(e.to_string())
+    }
+}
+impl From<PlotError> for Failure {
+    fn from(e: PlotError) -> Self {
+        Failure::Environment(e.to_string())
+    }
+}
+impl From<FolderError> for Failure {
+    fn from(e: FolderError) -> Self {
+        Failure::Environment(e.to_string())
+    }
+}
+
+impl Failure {
+    fn code(&self) -> u8 {
+        match self {
+            Failure::Scene(_) => code::SCENE,
+            Failure::Sim(SimError::Unfilled(_)) => code::SCENE,
+            Failure::Sim(e) if e.is_non_finite() => code::NON_FINITE,
+            Failure::Sim(_) => code::NOT_CONVERGED,
+            Failure::Environment(_) => code::ENVIRONMENT,
+            Failure::Usage(_) => code::USAGE,
+            Failure::Interrupted => code::INTERRUPTED,
+        }
+    }
+
+    fn print(self) {
+        match self {
+            Failure::Scene(e) => eprintln!("{:?}", miette::Report::new(*e)),
+            Failure::Sim(e) => eprintln!("error: {e}\n  help: {}", e.remedy()),
+            Failure::Environment(text) | Failure::Usage(text) => eprintln!("error: {text}"),
+            Failure::Interrupted => {}
+        }
+    }
+}
+
+/// Reads the arguments, does what they say, and gives the exit code.
+pub fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Run(args) => run::run(&args),
+        Command::Plan(args) => plan::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Presets(args) => presets::run(&args),
+        Command::Schema => print(&scene::json_schema()),
+        Command::Completions { shell } => {
+            let mut out = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "grainscope", &mut out);
+            print(&String::from_utf8_lossy(&out))
+        }
+        Command::Man => {
+            let mut out = Vec::new();
+            match clap_mangen::Man::new(Cli::command()).render(&mut out) {
+                Ok(()) => print(&String::from_utf8_lossy(&out)),
+                Err(e) => Err(Failure::Environment(e.to_string())),
+            }
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            let code = failure.code();
+            failure.print();
+            ExitCode::from(code)
+        }
+    }
+}
+
+/// Writes to stdout; a closed pipe is the reader's wish, not a fault.
+fn print(text: &str) -> Result<(), Failure> {
+    use std::io::Write;
+    match writeln!(std::io::stdout(), "{}", text.trim_end()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::Environment(format!("cannot write the output: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Finds a scene by preset name or path, and applies `--set`s.
+fn source(name: &str, sets: &[String]) -> Result<SceneSource, Failure> {
+    let path = Path::new(name);
+    let is_path = path.extension().is_some() || name.contains(['/', '\\']) || path.is_file();
+    let source = if is_path { scene::load(path)? } else { scene::presets::find(name)? };
+    Ok(source.with_sets(sets)?)
+}
+
+/// The scene of a source and its plan, errors pointing into the source.
+fn resolve(source: &SceneSource) -> Result<(Scene, crate::plan::Plan), Failure> {
+    let scene = scene::parse(source)?;
+    let plan = crate::plan::resolve(&scene).map_err(|e| e.with_source(source))?;
+    Ok((scene, plan))
+}

@@ -1,0 +1,454 @@
+//! `grainscope run`: a scene goes in, a recording, tables and plots come out.
+
+use super::{Failure, print};
+use crate::frame::Frame;
+use crate::plan::Plan;
+use crate::record::logger::{Backpressure, Logger, Traffic};
+use crate::record::plots::{Axis, Curve, PlotSpec, line_plot, panels_plot};
+use crate::record::rerun_log::{RerunLog, Sink};
+use crate::record::series::SeriesWriter;
+use crate::record::summary::{Ending, Summary, Tally};
+use crate::record::text::duration;
+use crate::record::{folder, info};
+use crate::scene::{Quantity, Scene, SceneSource, Scope, to_toml};
+use crate::sim::row::{Phases, Row};
+use crate::sim::{self, Run, SimError, picture};
+use crossbeam::channel::bounded;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Preset name or path of a TOML file
+    scene: String,
+    /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// Folder of the run [default: runs/<scene name>, numbered if taken]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite a run that is already in the folder
+    #[arg(long)]
+    force: bool,
+    /// Stop after this many steps
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+    /// Stop at this time (s); shortens the scene's time.end
+    #[arg(long, value_name = "T")]
+    until: Option<String>,
+    /// Write the recording here instead of into the folder
+    #[arg(long, value_name = "PATH", conflicts_with = "no_recording")]
+    save: Option<PathBuf>,
+    /// Write no recording
+    #[arg(long)]
+    no_recording: bool,
+    /// Serve the viewer from this process on 127.0.0.1, while running and after
+    #[arg(long)]
+    serve: bool,
+    /// Port of the served page; 0 takes any free one
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    port: u16,
+    /// Send to a viewer that already listens (rerun+http://127.0.0.1:9876/proxy)
+    #[arg(long, value_name = "URL")]
+    connect: Option<String>,
+    /// Start the rerun viewer found on the PATH
+    #[arg(long)]
+    spawn: bool,
+    /// Print the summary as JSON on stdout
+    #[arg(long)]
+    json: bool,
+    /// Print seconds per phase at the end
+    #[arg(long)]
+    profile: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let source = super::source(&args.scene, &args.sets)?;
+    let (scene, plan) = match &args.until {
+        None => super::resolve(&source)?,
+        Some(text) => {
+            let scene = shorten(&source, text)?;
+            let plan = crate::plan::resolve(&scene).map_err(|e| e.with_source(&source))?;
+            (scene, plan)
+        }
+    };
+    let interrupted = Arc::new(AtomicBool::new(false));
+    watch_interrupts(&interrupted);
+    let plan = Arc::new(plan);
+    // Fills cells and solves once: scenes that cannot start leave no folder behind.
+    let clock = Instant::now();
+    let run = sim::start(plan.clone())?;
+    let folder = folder::create(&scene.name, args.out.as_deref(), args.force)?;
+    let session = Session::open(args, &plan, run, folder, clock, interrupted)?;
+    session.go()
+}
+
+/// The scene with an earlier end; frames keep their interval.
+fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
+    let mut scene = crate::scene::parse(source)?;
+    let scope = Scope::new(&scene).map_err(|e| e.with_source(source))?;
+    let until = Quantity::expression(text).eval(&scope).map_err(|e| {
+        Failure::Usage(format!("--until {text}: {}; give a time in seconds", e.message()))
+    })?;
+    let end = scene.time.end.eval(&scope).map_err(|e| e.with_source(source))?;
+    if !(until > 0.0 && until <= end) {
+        return Err(Failure::Usage(format!(
+            "--until {until}: the scene runs from 0 to {end} s; use --set time.end={until} to run \
+             longer"
+        )));
+    }
+    let frames = f64::from(scene.recording.frames);
+    scene.recording.frames = (frames * until / end).ceil() as u32;
+    let mut kept = Vec::new();
+    for q in scene.recording.times {
+        if q.eval(&scope).map_err(|e| e.with_source(source))? <= until {
+            kept.push(q);
+        }
+    }
+    scene.recording.times = kept;
+    scene.time.end = Quantity::number(until);
+    Ok(scene)
+}
+
+/// The first interrupt ends the run after its step; a second one ends the program.
+fn watch_interrupts(flag: &Arc<AtomicBool>) {
+    let flag = flag.clone();
+    let watching = ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::SeqCst) {
+            std::process::exit(i32::from(super::code::INTERRUPTED));
+        }
+    });
+    if let Err(e) = watching {
+        eprintln!("warning: interrupts end the program at once: {e}");
+    }
+}
+
+/// A run with everything it writes to.
+struct Session {
+    plan: Arc<Plan>,
+    run: Box<dyn Run>,
+    folder: PathBuf,
+    series: SeriesWriter,
+    recording: Option<PathBuf>,
+    logger: Option<Logger>,
+    clock: Instant,
+    interrupted: Arc<AtomicBool>,
+    tally: Tally,
+    rows: Vec<Row>,
+    next_frame: usize,
+    steps: Option<u64>,
+    json: bool,
+    profile: bool,
+}
+
+impl Session {
+    fn open(
+        args: &Args,
+        plan: &Arc<Plan>,
+        run: Box<dyn Run>,
+        folder: PathBuf,
+        clock: Instant,
+        interrupted: Arc<AtomicBool>,
+    ) -> Result<Session, Failure> {
+        let cannot = |path: &Path, e: std::io::Error| {
+            Failure::Environment(format!("cannot write {}: {e}", path.display()))
+        };
+        let scene_file = folder.join("scene.toml");
+        std::fs::write(&scene_file, to_toml(&plan.scene)).map_err(|e| cannot(&scene_file, e))?;
+        let series_file = folder.join("series.csv");
+        let series = SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
+        let recording = (!args.no_recording)
+            .then(|| args.save.clone().unwrap_or_else(|| folder.join("recording.rrd")));
+        let mut sinks: Vec<Sink> = recording.iter().cloned().map(Sink::Save).collect();
+        if args.serve {
+            sinks.push(Sink::Serve { web_port: args.port, grpc_port: 0 });
+        }
+        sinks.extend(args.connect.clone().map(Sink::Connect));
+        sinks.extend(args.spawn.then_some(Sink::Spawn));
+        let name = folder.file_name().map_or(plan.scene.name.clone(), |n| n.to_string_lossy().into());
+        let mut warnings: Vec<String> = plan.warnings.iter().map(ToString::to_string).collect();
+        let every = picture::thinning(plan, picture::drawn(plan, run.particles()).len());
+        if every > 1 && !sinks.is_empty() {
+            warnings.push(crate::plan::Warning::ParticlesThinned { every }.to_string());
+        }
+        for w in &warnings {
+            eprintln!("warning: {w}");
+        }
+        let logger = if sinks.is_empty() {
+            None
+        } else {
+            let log = RerunLog::open(&info::run_info(plan, &name), &sinks)?;
+            if let Some(url) = log.url() {
+                eprintln!("viewer: {url}");
+            }
+            let policy = if recording.is_some() { Backpressure::Wait } else { Backpressure::DropOldest };
+            Some(Logger::start(log, policy).map_err(|e| {
+                Failure::Environment(format!("the logger thread cannot be started: {e}"))
+            })?)
+        };
+        let tally = Tally {
+            phases: Phases::default(),
+            wall: 0.0,
+            largest_power_error: 0.0,
+            largest_divergence: 0.0,
+            first_energy: run.row().potential_energy,
+            traffic: Traffic::default(),
+            logger_seconds: 0.0,
+            warnings,
+        };
+        Ok(Session {
+            plan: plan.clone(),
+            run,
+            folder,
+            series,
+            recording,
+            logger,
+            clock,
+            interrupted,
+            tally,
+            rows: Vec::new(),
+            next_frame: 0,
+            steps: args.steps,
+            json: args.json,
+            profile: args.profile,
+        })
+    }
+
+    /// Runs on a thread of its own while this one shows progress; then closes all files.
+    fn go(mut self) -> Result<(), Failure> {
+        let end = self.plan.clock.end * self.plan.units.time;
+        let (sender, receiver) = bounded::<(u64, f64)>(1);
+        let thread = std::thread::Builder::new()
+            .name("simulation".into())
+            .spawn(move || {
+                let outcome = self.compute(|step, time| {
+                    // The display may miss steps; it never holds the simulation up.
+                    let _ = sender.try_send((step, time));
+                });
+                (self, outcome)
+            })
+            .map_err(|e| {
+                Failure::Environment(format!("the simulation thread cannot be started: {e}"))
+            })?;
+        let bar = ProgressBar::with_draw_target(Some(10_000), ProgressDrawTarget::stderr_with_hz(8));
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}  {elapsed} of about {duration}") {
+            bar.set_style(style);
+        }
+        for (step, time) in receiver {
+            bar.set_position((1e4 * time / end) as u64);
+            bar.set_message(format!("step {step}, t = {time:.3e} of {end:.3e} s"));
+        }
+        bar.finish_and_clear();
+        match thread.join() {
+            Ok((session, outcome)) => session.close(outcome),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    }
+
+    fn compute(&mut self, mut progress: impl FnMut(u64, f64)) -> Result<Ending, Failure> {
+        self.observe(vec![])?;
+        while !self.run.is_finished() {
+            if self.interrupted.load(Ordering::SeqCst) {
+                return Ok(Ending::Interrupted);
+            }
+            if self.steps.is_some_and(|n| self.run.row().step >= n) {
+                return Ok(Ending::StepLimit);
+            }
+            self.run.step()?;
+            let events = self.run.events().to_vec();
+            self.observe(events)?;
+            progress(self.run.row().step, self.run.row().time);
+        }
+        Ok(Ending::Finished)
+    }
+
+    /// Writes down the current state.
+    fn observe(&mut self, mut notes: Vec<String>) -> Result<(), Failure> {
+        let row = self.run.row().clone();
+        self.series.write(&row).map_err(|e| {
+            Failure::Environment(format!(
+                "cannot write {}: {e}",
+                self.folder.join("series.csv").display()
+            ))
+        })?;
+        self.tally.phases.add(&row.seconds);
+        self.tally.largest_power_error = self.tally.largest_power_error.max(row.power_error);
+        self.tally.largest_divergence = self.tally.largest_divergence.max(row.divergence_error);
+        if let Some(logger) = &mut self.logger {
+            let frames = &self.plan.clock.frames;
+            let time = row.time / self.plan.units.time;
+            let due = frames.get(self.next_frame).is_some_and(|&t| t <= time * (1.0 + 1e-12));
+            while frames.get(self.next_frame).is_some_and(|&t| t <= time * (1.0 + 1e-12)) {
+                self.next_frame += 1;
+            }
+            if row.step == 0 {
+                notes.extend(self.tally.warnings.iter().cloned());
+            }
+            let picture = due.then(|| self.run.picture());
+            let wall = self.clock.elapsed().as_secs_f64();
+            let alignment = picture.is_some().then(|| self.run.mean_alignment()).flatten();
+            let frame: Frame = info::frame(&self.plan, &row, wall, alignment, picture, notes);
+            if logger.send(frame).is_err() {
+                return Err(Failure::Environment("the recording ended early".into()));
+            }
+        }
+        self.rows.push(row);
+        Ok(())
+    }
+
+    /// Closes the recording, writes plots and summary, and says what there is.
+    fn close(mut self, outcome: Result<Ending, Failure>) -> Result<(), Failure> {
+        let mut served = None;
+        let mut recorded = None;
+        let mut fault = None;
+        if let Some(logger) = self.logger.take() {
+            let (result, traffic, busy) = logger.finish();
+            self.tally.traffic = traffic;
+            self.tally.logger_seconds = busy.as_secs_f64();
+            match result {
+                Ok(done) => {
+                    for notice in &done.notices {
+                        eprintln!("warning: {notice}");
+                    }
+                    self.tally.warnings.extend(done.notices);
+                    recorded = done.saved.first().map(|s| (s.path.clone(), s.bytes));
+                    served = done.served;
+                }
+                // The cause of an early end, or a fault at the very end.
+                Err(e) => fault = Some(Failure::from(e)),
+            }
+        }
+        self.tally.wall = self.clock.elapsed().as_secs_f64();
+        for w in self.run.warnings() {
+            eprintln!("warning: {w}");
+            self.tally.warnings.push(w.to_string());
+        }
+        let ending = match &outcome {
+            Ok(e) => *e,
+            Err(_) => Ending::Failed,
+        };
+        let mut summary = Summary::new(
+            self.run.as_ref(),
+            &self.tally,
+            ending,
+            self.folder.display().to_string(),
+            self.recording.as_ref().map(|p| p.display().to_string()),
+        );
+        let failure = match (outcome, fault) {
+            (_, Some(e)) => Some(e),
+            (Err(e), None) => Some(e),
+            (Ok(Ending::Interrupted), None) => Some(Failure::Interrupted),
+            (Ok(_), None) => None,
+        };
+        summary.error = failure.as_ref().and_then(describe);
+        let json = serde_json::to_string_pretty(&summary)
+            .map_err(|e| Failure::Environment(e.to_string()))?;
+        let path = self.folder.join("summary.json");
+        std::fs::write(&path, format!("{json}\n"))
+            .map_err(|e| Failure::Environment(format!("cannot write {}: {e}", path.display())))?;
+        self.plot()?;
+        if self.json {
+            print(&json)?;
+        } else {
+            print(&self.report(&summary, recorded))?;
+        }
+        if let (Some(served), None) = (&served, &failure) {
+            eprintln!("still serving {} (Ctrl-C ends)", served.url());
+            while !self.interrupted.load(Ordering::SeqCst) {
+                std::thread::sleep(std::time::Duration::from_millis(100));
+            }
+        }
+        failure.map_or(Ok(()), Err)
+    }
+
+    fn plot(&self) -> Result<(), Failure> {
+        let time = || Axis::new("time", "s");
+        let curve = |name: &str, value: &dyn Fn(&Row) -> f64| Curve {
+            name: name.into(),
+            points: self.rows.iter().map(|r| (r.time, value(r))).collect(),
+            marks: false,
+        };
+        let title = &self.plan.scene.name;
+        let gauges = &self.plan.gauges;
+        if !gauges.is_empty() {
+            let of = |value: &dyn Fn(&Row, usize) -> f64| -> Vec<Curve> {
+                (0..gauges.len()).map(|k| curve(&gauges[k].name, &|r| value(r, k))).collect()
+            };
+            panels_plot(&self.folder.join("outflow"), &[
+                PlotSpec {
+                    title: format!("{title}: volume that has flowed out"),
+                    x: time(),
+                    y: Axis::new("outflow volume", "m²"),
+                    curves: of(&|r, k| r.gauges[k].volume),
+                },
+                PlotSpec {
+                    title: "rate of outflow".into(),
+                    x: time(),
+                    y: Axis::new("outflow rate", "m²/s"),
+                    curves: of(&|r, k| r.gauges[k].rate),
+                },
+            ])?;
+        }
+        line_plot(&self.folder.join("diagnostics"), &PlotSpec {
+            title: format!("{title}: balances"),
+            x: time(),
+            y: Axis::new("relative error", "").log(),
+            curves: vec![
+                curve("power", &|r| r.power_error),
+                curve("divergence", &|r| r.divergence_error),
+                curve("volume", &|r| r.volume_error),
+            ],
+        })?;
+        Ok(())
+    }
+
+    /// What a person wants to know at the end.
+    fn report(&self, s: &Summary, recorded: Option<(PathBuf, u64)>) -> String {
+        let ending = match s.ending {
+            Ending::Finished => "finished",
+            Ending::StepLimit => "stopped at the step limit",
+            Ending::Interrupted => "interrupted",
+            Ending::Failed => "failed",
+        };
+        let mut out = format!(
+            "{} {ending}: {} steps to t = {:.4e} s in {}\n",
+            s.scene,
+            s.steps,
+            s.time,
+            duration(self.tally.wall)
+        );
+        for (name, g) in &s.gauges {
+            out += &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
+        }
+        let drift = s.volume_drift.values().map(|d| d.abs()).fold(0.0, f64::max);
+        out += &format!(
+            "  balances: power {:.1e}, energy {:.1e}, divergence {:.1e}, volume drift {drift:.1e}\n",
+            s.balances.power_error,
+            s.balances.energy_error.abs(),
+            s.balances.divergence_error
+        );
+        if self.profile {
+            for (name, seconds) in &s.seconds {
+                out += &format!("  {name:<20} {seconds:>9.3} s {:>5.1} %\n", 100.0 * seconds / self.tally.wall);
+            }
+        }
+        out += &format!("  folder: {}\n", self.folder.display());
+        if let Some((path, bytes)) = recorded {
+            out += &format!("  recording: {} ({:.1} MB)\n", path.display(), bytes as f64 / 1e6);
+        }
+        out
+    }
+}
+
+/// A failure in one line, for the summary.
+fn describe(f: &Failure) -> Option<String> {
+    match f {
+        Failure::Sim(e) => Some(format!("{e}; {}", SimError::remedy(e))),
+        Failure::Environment(text) | Failure::Usage(text) => Some(text.clone()),
+        Failure::Scene(e) => Some(e.one_line()),
+        Failure::Interrupted => None,
+    }
+}

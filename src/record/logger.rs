@@ -1,0 +1,113 @@
+//! The logger thread: frames arrive over a bounded channel, in order.
+
+use super::rerun_log::{Finished, RecordError, RerunLog};
+use crate::frame::Frame;
+use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Frames that may wait for the logger.
+const CAPACITY: usize = 8;
+
+/// What to do when the logger is behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Backpressure {
+    /// The simulation waits: nothing is lost. For recordings.
+    Wait,
+    /// The oldest waiting frame is dropped: the newest matters. For watching.
+    DropOldest,
+}
+
+/// How often the two threads met.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Traffic {
+    pub frames: u64,
+    pub drops: u64,
+    /// Frames that had to wait, and how long in all.
+    pub waits: u64,
+    pub waited: Duration,
+}
+
+/// Handle of the logger thread.
+pub struct Logger {
+    policy: Backpressure,
+    sender: Sender<Frame>,
+    /// The other end, to take the oldest frame out.
+    oldest: Receiver<Frame>,
+    thread: JoinHandle<Result<Finished, RecordError>>,
+    busy_ns: Arc<AtomicU64>,
+    traffic: Traffic,
+}
+
+/// The logger ended early; [`Logger::finish`] says why.
+#[derive(Debug)]
+pub struct LoggerGone;
+
+impl Logger {
+    /// Starts the thread on an open recording.
+    pub fn start(log: RerunLog, policy: Backpressure) -> std::io::Result<Logger> {
+        let (sender, receiver) = bounded::<Frame>(CAPACITY);
+        let oldest = receiver.clone();
+        let busy_ns = Arc::new(AtomicU64::new(0));
+        let busy = busy_ns.clone();
+        let thread = std::thread::Builder::new().name("logger".into()).spawn(move || {
+            let mut log = log;
+            // Ends when the sender is dropped; after a fault frames are only drained, so that
+            // the simulation never blocks on a dead logger.
+            let mut fault = None;
+            for frame in receiver {
+                let clock = Instant::now();
+                if fault.is_none() {
+                    fault = log.frame(&frame).err();
+                }
+                busy.fetch_add(clock.elapsed().as_nanos() as u64, Ordering::Relaxed);
+            }
+            match fault {
+                Some(e) => Err(e),
+                None => log.finish(),
+            }
+        })?;
+        Ok(Logger { policy, sender, oldest, thread, busy_ns, traffic: Traffic::default() })
+    }
+
+    pub fn send(&mut self, frame: Frame) -> Result<(), LoggerGone> {
+        self.traffic.frames += 1;
+        match self.sender.try_send(frame) {
+            Ok(()) => Ok(()),
+            Err(TrySendError::Disconnected(_)) => Err(LoggerGone),
+            Err(TrySendError::Full(mut frame)) => match self.policy {
+                Backpressure::Wait => {
+                    let clock = Instant::now();
+                    let sent = self.sender.send(frame).map_err(|_| LoggerGone);
+                    self.traffic.waits += 1;
+                    self.traffic.waited += clock.elapsed();
+                    sent
+                }
+                Backpressure::DropOldest => loop {
+                    if self.oldest.try_recv().is_ok() {
+                        self.traffic.drops += 1;
+                    }
+                    match self.sender.try_send(frame) {
+                        Ok(()) => return Ok(()),
+                        Err(TrySendError::Full(f)) => frame = f,
+                        Err(TrySendError::Disconnected(_)) => return Err(LoggerGone),
+                    }
+                },
+            },
+        }
+    }
+
+    /// Waits until everything is recorded.
+    pub fn finish(self) -> (Result<Finished, RecordError>, Traffic, Duration) {
+        let Logger { sender, oldest, thread, busy_ns, traffic, .. } = self;
+        drop(sender);
+        drop(oldest);
+        let result = match thread.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        (result, traffic, Duration::from_nanos(busy_ns.load(Ordering::Relaxed)))
+    }
+}

@@ -1,0 +1,12 @@
+//! From frames to what people look at: the logger thread, recordings, tables and plots.
+
+pub mod color;
+pub mod folder;
+pub mod info;
+pub mod logger;
+pub mod number;
+pub mod plots;
+pub mod rerun_log;
+pub mod series;
+pub mod summary;
+pub mod text;

@@ -1,0 +1,666 @@
+//! Line plots on paper: the same figure as SVG and as PNG.
+//!
+//! Axes are drawn here rather than by plotters' chart builder, which places
+//! the legend upon the data, labels logarithms badly and knows no engineering
+//! notation. Nothing panics on empty, constant or infinite data.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::FontStyle;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::color::OKABE_ITO;
+use super::number::{engineering_exponent, trim_zeros};
+
+/// Size of a figure (pixels); stacked panels share the height.
+const SIZE: (u32, u32) = (1200, 750);
+
+/// Height of one panel of a stack (pixels).
+const PANEL_HEIGHT: u32 = 380;
+
+/// A PNG is drawn this much larger and averaged: plotters does not smooth
+/// thick lines itself.
+const OVERSAMPLING: u32 = 2;
+
+/// An SVG is drawn this much larger and shrunk by its view box: plotters
+/// rounds to whole pixels, which would leave steps in smooth curves.
+const SVG_GRAIN: u32 = 8;
+
+/// Curves with more points than this are thinned to their extremes per pixel.
+const MOST_POINTS: usize = 5000;
+
+const FONT: &str = "sans-serif";
+const INK: RGBColor = RGBColor(34, 34, 38);
+const GRID: RGBColor = RGBColor(225, 225, 228);
+
+/// One axis.
+#[derive(Debug, Clone, Default)]
+pub struct Axis {
+    /// What it measures, such as `time`.
+    pub name: String,
+    /// Its unit, such as `s` or `m²/s`; empty for pure numbers.
+    pub unit: String,
+    /// Whether it is logarithmic. Values that are not positive are left out.
+    pub log: bool,
+}
+
+impl Axis {
+    /// A linear axis.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            log: false,
+        }
+    }
+
+    /// The same axis, logarithmic.
+    pub fn log(self) -> Self {
+        Self { log: true, ..self }
+    }
+}
+
+/// One curve.
+#[derive(Debug, Clone, Default)]
+pub struct Curve {
+    /// Its name in the legend.
+    pub name: String,
+    /// Its points; a point that is not finite interrupts the line.
+    pub points: Vec<(f64, f64)>,
+    /// Whether the points are marked.
+    pub marks: bool,
+}
+
+/// A plot.
+#[derive(Debug, Clone, Default)]
+pub struct PlotSpec {
+    /// What it shows.
+    pub title: String,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
+    /// The curves, at best seven: then colours repeat.
+    pub curves: Vec<Curve>,
+}
+
+/// Why a plot was not written.
+#[derive(Debug, thiserror::Error)]
+#[error("the plot {} cannot be written: {cause}", path.display())]
+pub struct PlotError {
+    /// The file.
+    pub path: PathBuf,
+    /// What the system says.
+    pub cause: String,
+}
+
+/// Writes `<stem>.svg` and `<stem>.png`.
+pub fn line_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
+    write(stem, std::slice::from_ref(plot), SIZE)
+}
+
+/// Writes several plots, one below the other, to `<stem>.svg` and `<stem>.png`.
+pub fn panels_plot(stem: &Path, plots: &[PlotSpec]) -> Result<(), PlotError> {
+    let count = u32::try_from(plots.len()).unwrap_or(1).max(1);
+    write(stem, plots, (SIZE.0, PANEL_HEIGHT * count))
+}
+
+fn write(stem: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), PlotError> {
+    // Not `with_extension`: a stem such as `dt_0.01` has none to replace.
+    let file = |extension: &str| {
+        let mut name = stem.as_os_str().to_owned();
+        name.push(extension);
+        PathBuf::from(name)
+    };
+    let (svg, png) = (file(".svg"), file(".png"));
+    to_svg(&svg, plots, size).map_err(|cause| PlotError { path: svg, cause })?;
+    to_png(&png, plots, size).map_err(|cause| PlotError { path: png, cause })
+}
+
+fn to_svg(path: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), String> {
+    font()?;
+    let (width, height) = (size.0 * SVG_GRAIN, size.1 * SVG_GRAIN);
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
+        let pen = Pen {
+            scale: f64::from(SVG_GRAIN),
+            joins: true,
+        };
+        figure(&root, plots, pen).map_err(|e| e.to_string())?;
+        root.present().map_err(|e| e.to_string())?;
+    }
+    // The view box, which follows, keeps the large size.
+    let text = text.replacen(
+        &format!("width=\"{width}\" height=\"{height}\""),
+        &format!("width=\"{}\" height=\"{}\"", size.0, size.1),
+        1,
+    );
+    std::fs::write(path, text).map_err(|e| e.to_string())
+}
+
+fn to_png(path: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), String> {
+    font()?;
+    let large = (size.0 * OVERSAMPLING, size.1 * OVERSAMPLING);
+    let mut pixels = vec![0; 3 * large.0 as usize * large.1 as usize];
+    {
+        let root = BitMapBackend::with_buffer(&mut pixels, large).into_drawing_area();
+        let pen = Pen {
+            scale: f64::from(OVERSAMPLING),
+            joins: false,
+        };
+        figure(&root, plots, pen).map_err(|e| e.to_string())?;
+        root.present().map_err(|e| e.to_string())?;
+    }
+    let small = average(&pixels, size);
+    // Opened here first: the encoder's error does not name its cause.
+    std::fs::File::create(path).map_err(|e| e.to_string())?;
+    let root = BitMapBackend::new(path, size).into_drawing_area();
+    let image = BitMapElement::with_owned_buffer((0, 0), size, small)
+        .ok_or("the image has a wrong size")?;
+    root.draw(&image).map_err(|e| e.to_string())?;
+    root.present().map_err(|e| e.to_string())
+}
+
+/// Averages blocks of `OVERSAMPLING` by `OVERSAMPLING` pixels.
+fn average(pixels: &[u8], (width, height): (u32, u32)) -> Vec<u8> {
+    let (width, height) = (width as usize, height as usize);
+    let k = OVERSAMPLING as usize;
+    let mut small = Vec::with_capacity(3 * width * height);
+    for y in 0..height {
+        for x in 0..width {
+            for channel in 0..3 {
+                let mut sum = 0;
+                for dy in 0..k {
+                    for dx in 0..k {
+                        let at = ((y * k + dy) * width * k + x * k + dx) * 3 + channel;
+                        sum += usize::from(pixels[at]);
+                    }
+                }
+                small.push((sum / (k * k)) as u8);
+            }
+        }
+    }
+    small
+}
+
+/// Registers the font that is part of the program, so that no other is needed.
+fn font() -> Result<(), String> {
+    static FONT_IS_KNOWN: OnceLock<bool> = OnceLock::new();
+    let known = FONT_IS_KNOWN.get_or_init(|| {
+        let file = epaint_default_fonts::UBUNTU_LIGHT;
+        plotters::style::register_font(FONT, FontStyle::Normal, file).is_ok()
+    });
+    known
+        .then_some(())
+        .ok_or_else(|| "the built-in font is broken".to_owned())
+}
+
+/// How a backend draws.
+#[derive(Clone, Copy)]
+struct Pen {
+    /// Pixels of the backend per pixel of the figure.
+    scale: f64,
+    /// Whether it joins thick lines well. Plotters' bitmaps do not: at sharp
+    /// turns their joints shoot out of the figure.
+    joins: bool,
+}
+
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+
+fn figure<B: DrawingBackend>(
+    root: &DrawingArea<B, Shift>,
+    plots: &[PlotSpec],
+    pen: Pen,
+) -> Drawn<B> {
+    root.fill(&WHITE)?;
+    for (area, plot) in root.split_evenly((plots.len().max(1), 1)).iter().zip(plots) {
+        Panel::new(area, plot, pen).draw()?;
+    }
+    Ok(())
+}
+
+/// An axis laid out for some data.
+struct Scale {
+    /// Ends, in logarithms if `log`.
+    low: f64,
+    high: f64,
+    log: bool,
+    /// Where ticks are, and what they say.
+    ticks: Vec<(f64, String)>,
+    label: String,
+}
+
+impl Scale {
+    fn new(axis: &Axis, values: impl Iterator<Item = f64>) -> Option<Self> {
+        let (mut low, mut high) = values
+            .map(|value| if axis.log { value.log10() } else { value })
+            .filter(|value| value.is_finite())
+            .fold(None, |ends: Option<(f64, f64)>, value| {
+                Some(ends.map_or((value, value), |(l, h)| (l.min(value), h.max(value))))
+            })?;
+        if high - low <= 1e-12 * low.abs().max(high.abs()) {
+            // A constant is a line in the middle.
+            let room = match (axis.log, low == 0.0) {
+                (true, _) => 0.5,
+                (false, true) => 1.0,
+                (false, false) => 0.5 * low.abs(),
+            };
+            (low, high) = (low - room, high + room);
+        }
+        Some(if axis.log {
+            Self::logarithmic(axis, low, high)
+        } else {
+            Self::linear(axis, low, high)
+        })
+    }
+
+    fn linear(axis: &Axis, low: f64, high: f64) -> Self {
+        let step = nice_step(high - low);
+        let first = (low / step).ceil() as i64;
+        let last = (high / step).floor() as i64;
+        // Numbers such as 0.2 or 1500 are read as they are; others are not.
+        let reach = low.abs().max(high.abs());
+        let exponent = if (0.1..1e4).contains(&reach) {
+            0
+        } else {
+            engineering_exponent(reach)
+        };
+        let factor = 10f64.powi(exponent);
+        let decimals = (-(step / factor).log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
+        let ticks = (first..=last)
+            .map(|i| {
+                let value = i as f64 * step;
+                let text = format!("{:.decimals$}", value / factor);
+                (value, text.replace('-', "−"))
+            })
+            .collect();
+        Self {
+            low,
+            high,
+            log: false,
+            ticks,
+            label: axis_label(axis, exponent),
+        }
+    }
+
+    fn logarithmic(axis: &Axis, low: f64, high: f64) -> Self {
+        // Less than half a decade of data is still shown on half a decade.
+        let short = (0.5 - (high - low)).max(0.0) / 2.0;
+        let (low, high) = (low - short, high + short);
+        let span = high - low;
+        let ticks = if span > 2.0 {
+            let step = (span / 8.0).ceil().max(1.0) as i64;
+            let first = (low / step as f64).ceil() as i64;
+            let last = (high / step as f64).floor() as i64;
+            (first..=last)
+                .map(|i| ((i * step) as f64, decade(i * step)))
+                .collect()
+        } else {
+            let digits: &[f64] = if span > 1.0 {
+                &[1.0, 2.0, 5.0]
+            } else {
+                &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]
+            };
+            let (first, last) = (low.floor() as i64, high.floor() as i64);
+            (first..=last)
+                .flat_map(|e| digits.iter().map(move |d| (d.log10() + e as f64, *d, e)))
+                .filter(|(place, ..)| (low..=high).contains(place))
+                .map(|(place, digit, e)| (place, plain(digit, e)))
+                .collect()
+        };
+        Self {
+            low,
+            high,
+            log: true,
+            ticks,
+            label: axis_label(axis, 0),
+        }
+    }
+
+    /// Moves the ends out by a share of the span.
+    fn widen(mut self, share: f64) -> Self {
+        let room = share * (self.high - self.low);
+        self.low -= room;
+        self.high += room;
+        self
+    }
+
+    /// Where a value lies between the ends; `None` if it cannot be drawn.
+    fn place(&self, value: f64) -> Option<f64> {
+        let value = if self.log { value.log10() } else { value };
+        let place = (value - self.low) / (self.high - self.low);
+        place.is_finite().then_some(place)
+    }
+
+    fn place_of_tick(&self, tick: f64) -> f64 {
+        (tick - self.low) / (self.high - self.low)
+    }
+}
+
+/// The step among 1, 2, 5 times a power of ten that gives five to ten ticks.
+fn nice_step(span: f64) -> f64 {
+    let decade = 10f64.powf((span / 10.0).log10().floor());
+    let share = span / 10.0 / decade;
+    let digit = match share {
+        s if s <= 1.0 => 1.0,
+        s if s <= 2.0 => 2.0,
+        s if s <= 5.0 => 5.0,
+        _ => 10.0,
+    };
+    (digit * decade).max(f64::MIN_POSITIVE)
+}
+
+/// A power of ten.
+fn decade(exponent: i64) -> String {
+    match exponent {
+        -2..=3 => plain(1.0, exponent),
+        _ => format!("1e{exponent}").replace('-', "−"),
+    }
+}
+
+/// A digit times a power of ten.
+fn plain(digit: f64, exponent: i64) -> String {
+    let exponent = i32::try_from(exponent).unwrap_or(0);
+    if (-3..=4).contains(&exponent) {
+        let value = digit * 10f64.powi(exponent);
+        trim_zeros(&format!("{value:.4}")).to_owned()
+    } else {
+        format!("{}e{exponent}", trim_zeros(&format!("{digit:.1}"))).replace('-', "−")
+    }
+}
+
+/// Name and unit, with the power of ten pulled out of the numbers.
+fn axis_label(axis: &Axis, exponent: i32) -> String {
+    let Axis { name, unit, .. } = axis;
+    // Prefixes are for simple units: a millimetre squared is not 1e-3 m².
+    let simple = matches!(unit.as_str(), "m" | "s" | "Pa" | "N" | "J" | "W" | "Hz");
+    let prefix = match exponent {
+        0 => Some(""),
+        -9 => Some("n"),
+        -6 => Some("µ"),
+        -3 => Some("m"),
+        // Nobody counts in kiloseconds.
+        3 if unit != "s" => Some("k"),
+        6 if unit != "s" => Some("M"),
+        9 if unit != "s" => Some("G"),
+        _ => None,
+    };
+    let power = format!("1e{exponent}").replace('-', "−");
+    match (prefix, unit.is_empty()) {
+        (Some(""), true) => name.clone(),
+        (Some(""), false) => format!("{name} ({unit})"),
+        (Some(prefix), false) if simple => format!("{name} ({prefix}{unit})"),
+        (_, true) => format!("{name} ({power})"),
+        (_, false) => format!("{name} ({power} {unit})"),
+    }
+}
+
+/// One plot and the part of the figure it fills.
+struct Panel<'a, B: DrawingBackend> {
+    area: &'a DrawingArea<B, Shift>,
+    plot: &'a PlotSpec,
+    pen: Pen,
+    /// Left, top, right, bottom of the frame (pixels of the backend).
+    frame: [i32; 4],
+}
+
+impl<'a, B: DrawingBackend> Panel<'a, B> {
+    fn new(area: &'a DrawingArea<B, Shift>, plot: &'a PlotSpec, pen: Pen) -> Self {
+        let (width, height) = area.dim_in_pixel();
+        let px = |n: f64| (n * pen.scale).round() as i32;
+        let top = if plot.curves.len() > 1 { 88.0 } else { 56.0 };
+        let frame = [
+            px(105.0),
+            px(top),
+            i32::try_from(width).unwrap_or(i32::MAX) - px(35.0),
+            i32::try_from(height).unwrap_or(i32::MAX) - px(68.0),
+        ];
+        Self {
+            area,
+            plot,
+            pen,
+            frame,
+        }
+    }
+
+    fn px(&self, n: f64) -> i32 {
+        (n * self.pen.scale).round() as i32
+    }
+
+    fn line(&self, color: RGBColor, width: f64) -> ShapeStyle {
+        color.stroke_width(self.px(width).max(1) as u32)
+    }
+
+    fn text(&self, text: &str, size: f64, at: (i32, i32), pos: Pos) -> Drawn<B> {
+        let style = (FONT, size * self.pen.scale).into_text_style(self.area);
+        self.area.draw_text(text, &style.color(&INK).pos(pos), at)
+    }
+
+    fn draw(&self) -> Drawn<B> {
+        let [left, top, right, bottom] = self.frame;
+        if right <= left || bottom <= top {
+            return Ok(());
+        }
+        let middle = (left + right) / 2;
+        let centre = Pos::new(HPos::Center, VPos::Center);
+        self.text(&self.plot.title, 24.0, (middle, self.px(28.0)), centre)?;
+        self.legend()?;
+
+        let usable = |&&(x, y): &&(f64, f64)| {
+            let fits = |value: f64, log: bool| value.is_finite() && (!log || value > 0.0);
+            fits(x, self.plot.x.log) && fits(y, self.plot.y.log)
+        };
+        let points = self.plot.curves.iter().flat_map(|curve| &curve.points);
+        let points = points.filter(usable);
+        let scales = (
+            Scale::new(&self.plot.x, points.clone().map(|p| p.0)),
+            Scale::new(&self.plot.y, points.map(|p| p.1)),
+        );
+        if let (Some(x), Some(y)) = scales {
+            let marked = self.plot.curves.iter().any(|curve| curve.marks);
+            let (x, y) = (x.widen(if marked { 0.03 } else { 0.0 }), y.widen(0.05));
+            self.axes(&x, &y)?;
+            for (curve, color) in self.plot.curves.iter().zip(OKABE_ITO.iter().cycle()) {
+                self.curve(curve, *color, &x, &y)?;
+            }
+        } else {
+            let at = (middle, (top + bottom) / 2);
+            self.text("no data", 22.0, at, centre)?;
+        }
+        let frame = [
+            (left, top),
+            (right, top),
+            (right, bottom),
+            (left, bottom),
+            (left, top),
+        ];
+        self.area
+            .draw(&PathElement::new(frame, self.line(INK, 1.0)))
+    }
+
+    fn axes(&self, x: &Scale, y: &Scale) -> Drawn<B> {
+        let [left, top, right, bottom] = self.frame;
+        let (width, height) = (f64::from(right - left), f64::from(bottom - top));
+        for (tick, text) in &x.ticks {
+            let at = left + (x.place_of_tick(*tick) * width).round() as i32;
+            if !(left..=right).contains(&at) {
+                continue;
+            }
+            let line = [(at, top), (at, bottom)];
+            self.area
+                .draw(&PathElement::new(line, self.line(GRID, 1.0)))?;
+            let below = (at, bottom + self.px(8.0));
+            self.text(text, 17.0, below, Pos::new(HPos::Center, VPos::Top))?;
+        }
+        for (tick, text) in &y.ticks {
+            let at = bottom - (y.place_of_tick(*tick) * height).round() as i32;
+            if !(top..=bottom).contains(&at) {
+                continue;
+            }
+            let line = [(left, at), (right, at)];
+            self.area
+                .draw(&PathElement::new(line, self.line(GRID, 1.0)))?;
+            let beside = (left - self.px(9.0), at);
+            self.text(text, 17.0, beside, Pos::new(HPos::Right, VPos::Center))?;
+        }
+        let below = ((left + right) / 2, bottom + self.px(34.0));
+        self.text(&x.label, 19.0, below, Pos::new(HPos::Center, VPos::Top))?;
+        let style = (FONT, 19.0 * self.pen.scale)
+            .into_text_style(self.area)
+            .color(&INK)
+            .transform(FontTransform::Rotate270)
+            .pos(Pos::new(HPos::Center, VPos::Top));
+        let beside = (self.px(14.0), (top + bottom) / 2);
+        self.area.draw_text(&y.label, &style, beside)
+    }
+
+    /// Names of the curves, in a row above the frame.
+    fn legend(&self) -> Drawn<B> {
+        if self.plot.curves.len() < 2 {
+            return Ok(());
+        }
+        let [left, _, right, _] = self.frame;
+        let style = (FONT, 18.0 * self.pen.scale).into_text_style(self.area);
+        let widths = self.plot.curves.iter().map(|curve| {
+            let size = self.area.estimate_text_size(&curve.name, &style);
+            size.map_or(0, |(width, _)| i32::try_from(width).unwrap_or(0))
+        });
+        let widths: Vec<i32> = widths.collect();
+        let (swatch, gap, space) = (self.px(28.0), self.px(8.0), self.px(26.0));
+        let full: i32 = widths
+            .iter()
+            .map(|width| width + swatch + gap + space)
+            .sum();
+        let mut at = ((left + right - full + space) / 2).max(left);
+        let y = self.px(64.0);
+        let curves = self.plot.curves.iter().zip(&widths);
+        for ((curve, width), [r, g, b]) in curves.zip(OKABE_ITO.iter().cycle()) {
+            if at + swatch + gap + width > right + self.px(20.0) {
+                // What does not fit is left to the caption.
+                let pos = Pos::new(HPos::Left, VPos::Center);
+                return self.text("…", 18.0, (at, y), pos);
+            }
+            let line = [(at, y), (at + swatch, y)];
+            let style = self.line(RGBColor(*r, *g, *b), 3.0);
+            self.area.draw(&PathElement::new(line, style))?;
+            let pos = Pos::new(HPos::Left, VPos::Center);
+            self.text(&curve.name, 18.0, (at + swatch + gap, y), pos)?;
+            at += swatch + gap + width + space;
+        }
+        Ok(())
+    }
+
+    fn curve(&self, curve: &Curve, [r, g, b]: [u8; 3], x: &Scale, y: &Scale) -> Drawn<B> {
+        let [left, top, right, bottom] = self.frame;
+        let (width, height) = (f64::from(right - left), f64::from(bottom - top));
+        let place = |&(px, py): &(f64, f64)| {
+            let (u, v) = (x.place(px)?, y.place(py)?);
+            Some((
+                left + (u * width).round() as i32,
+                bottom - (v * height).round() as i32,
+            ))
+        };
+        let color = RGBColor(r, g, b);
+        let places: Vec<Option<(i32, i32)>> = curve.points.iter().map(place).collect();
+        for piece in places.split(Option::is_none) {
+            let piece: Vec<(i32, i32)> = piece.iter().flatten().copied().collect();
+            let piece = if piece.len() > MOST_POINTS {
+                extremes(&piece)
+            } else {
+                piece
+            };
+            // A single point has no line, and would vanish.
+            if curve.marks || piece.len() == 1 {
+                for &at in &piece {
+                    self.area
+                        .draw(&Circle::new(at, self.px(4.5), color.filled()))?;
+                }
+            }
+            let style = self.line(color, 2.0);
+            if !self.pen.joins {
+                for ends in piece.windows(2) {
+                    let ends = [ends[0], ends[1]];
+                    self.area.draw(&PathElement::new(ends, style))?;
+                }
+            } else if piece.len() > 1 {
+                self.area.draw(&PathElement::new(piece, style))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// First, lowest, highest and last point of each column of pixels.
+fn extremes(points: &[(i32, i32)]) -> Vec<(i32, i32)> {
+    let mut thin: Vec<(i32, i32)> = Vec::new();
+    for column in points.chunk_by(|a, b| a.0 == b.0) {
+        let low = column.iter().min_by_key(|point| point.1);
+        let high = column.iter().max_by_key(|point| point.1);
+        let kept = [column.first(), low, high, column.last()];
+        thin.extend(kept.into_iter().flatten());
+    }
+    thin.dedup();
+    thin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_pull_out_the_power_of_ten() {
+        let label = |name: &str, unit: &str, exponent| axis_label(&Axis::new(name, unit), exponent);
+        assert_eq!(label("time", "s", -3), "time (ms)");
+        assert_eq!(label("time", "s", 3), "time (1e3 s)");
+        assert_eq!(label("pressure", "Pa", 3), "pressure (kPa)");
+        assert_eq!(label("rate", "m²/s", -6), "rate (1e−6 m²/s)");
+        assert_eq!(label("steps", "", 0), "steps");
+    }
+
+    #[test]
+    fn steps_give_a_readable_number_of_ticks() {
+        for span in [1e-9, 0.3, 1.0, 7.7, 12.0, 4.9e8] {
+            let ticks = span / nice_step(span);
+            assert!((4.0..=10.01).contains(&ticks), "{span}: {ticks}");
+        }
+    }
+
+    #[test]
+    fn strange_data_is_drawn_all_the_same() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let curves: [&[(f64, f64)]; 6] = [
+            &[],
+            &[(0.0, 0.0)],
+            &[(1.0, 5.0), (2.0, 5.0)],
+            &[(f64::NAN, 1.0), (2.0, f64::INFINITY)],
+            &[(0.0, -1.0), (1.0, 1e300), (2.0, -1e300)],
+            &[(1e9, 1.0), (1e9 + 1e-7, 1.0 + 1e-16)],
+        ];
+        for (i, points) in curves.iter().enumerate() {
+            for log in [false, true] {
+                let axis = Axis {
+                    log,
+                    ..Axis::new("a", "s")
+                };
+                let curve = Curve {
+                    name: "c".to_owned(),
+                    points: points.to_vec(),
+                    marks: false,
+                };
+                let plot = PlotSpec {
+                    title: String::new(),
+                    x: axis.clone(),
+                    y: axis,
+                    curves: vec![curve],
+                };
+                let stem = folder.path().join(format!("plot_{i}_{log}"));
+                line_plot(&stem, &plot).expect("a plot");
+            }
+        }
+        panels_plot(&folder.path().join("none"), &[]).expect("an empty figure");
+    }
+}

@@ -1,0 +1,688 @@
+//! Recordings for the Rerun viewer. Only this module knows Rerun.
+//!
+//! One recording holds one run, under `runs/<name>`:
+//!
+//! | entity | what it shows |
+//! |---|---|
+//! | `world/particles`, `world/dye`, `world/directors` | the flow |
+//! | `world/walls`, `world/gauges` | what does not move |
+//! | `world/fields/<field>/{image,bar,ticks,isolines}` | one field |
+//! | the path of each scalar, and `<path>/log10` | the plots |
+//! | `scene`, `plan`, `log` | what was asked, what is solved, what went wrong |
+//!
+//! Timelines are `sim_time`, `step` and `wall_time`. Positions are metres with
+//! y up; the viewer draws y down, so `world` is mirrored by a static transform
+//! and looked at from its parent.
+
+mod bar;
+mod blueprint;
+mod sinks;
+
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use rerun::archetypes;
+use rerun::components::{Color, MagnificationFilter, Radius};
+use rerun::{EntityPath, EntityPathPart, RecordingStream};
+
+pub use sinks::{Saved, Sink};
+
+use crate::frame::{
+    Frame, GridField, Isoline, ParticleSnapshot, Picture, Quantity, Rect, RunInfo, Scalar,
+};
+use crate::record::color::{ColorScale, OKABE_ITO};
+use crate::record::number::short;
+use sinks::{Destinations, Live, Page, RrdFile};
+
+/// The application all recordings belong to.
+const APPLICATION: &str = "grainscope";
+
+const SIM_TIME: &str = "sim_time";
+const STEP: &str = "step";
+const WALL_TIME: &str = "wall_time";
+
+/// How often it is checked that everything arrived.
+const CHECK_EVERY: Duration = Duration::from_secs(2);
+
+/// How long a check may take. Slow disks exist; hung ones are an error.
+const CHECK_PATIENCE: Duration = Duration::from_secs(60);
+
+/// A file alone is written in pieces of this age: the default of 0.2 s would
+/// make five pieces per curve and second, which viewers have to merge again.
+const FILE_TICK: Duration = Duration::from_secs(1);
+
+/// From back to front.
+mod depth {
+    pub const FIELD: f32 = -20.0;
+    pub const PARTICLES: f32 = 0.0;
+    pub const GLYPHS: f32 = 10.0;
+    pub const DYE: f32 = 20.0;
+    pub const ISOLINES: f32 = 25.0;
+    pub const WALLS: f32 = 30.0;
+    pub const GAUGES: f32 = 40.0;
+    pub const LEGEND: f32 = 50.0;
+}
+
+const WALL: [u8; 3] = [38, 38, 42];
+const GAUGE: [u8; 3] = [213, 94, 0];
+const DYE: [u8; 3] = [20, 20, 30];
+const GLYPH: [u8; 3] = [10, 10, 14];
+const LINE: [u8; 3] = [20, 20, 24];
+const INK: [u8; 3] = [30, 30, 34];
+
+/// Why a recording failed.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be written.
+    #[error("the recording {} cannot be written: {cause}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// A viewer cannot be reached, and nothing else receives the recording.
+    #[error("the viewer at {name} does not answer: {cause}")]
+    Viewer {
+        /// Which viewer.
+        name: String,
+        /// What the connection says.
+        cause: String,
+    },
+    /// A port to serve on is taken.
+    #[error("port {port} of this machine cannot be used: {source}; 0 takes any free port")]
+    Port {
+        /// The port asked for.
+        port: u16,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Rerun does not take what it was given.
+    #[error("the recording could not be made: {0}")]
+    Stream(#[from] rerun::RecordingStreamError),
+    /// A picture has arrays of different lengths.
+    #[error("{what}: {found} values where {expected} belong")]
+    Length {
+        /// Which array.
+        what: String,
+        /// How many values it has.
+        found: usize,
+        /// How many it should have.
+        expected: usize,
+    },
+}
+
+/// Entity paths of one run.
+struct Paths {
+    root: EntityPath,
+}
+
+impl Paths {
+    fn new(name: &str) -> Self {
+        Self {
+            root: EntityPath::new(vec![
+                EntityPathPart::new("runs"),
+                EntityPathPart::new(name.to_owned()),
+            ]),
+        }
+    }
+
+    /// The entity at a path of the run, parts separated by slashes.
+    fn at(&self, path: &str) -> EntityPath {
+        let parts = path.split('/').filter(|part| !part.is_empty());
+        let parts = parts.map(|part| EntityPathPart::new(part.to_owned()));
+        self.root.join(&EntityPath::new(parts.collect()))
+    }
+
+    fn field(&self, name: &str) -> EntityPath {
+        let part = EntityPathPart::new(name.to_owned());
+        self.at("world/fields").join(&EntityPath::new(vec![part]))
+    }
+
+    fn curve(&self, path: &str, log10: bool) -> EntityPath {
+        if log10 {
+            self.at(&format!("{path}/log10"))
+        } else {
+            self.at(path)
+        }
+    }
+}
+
+/// A recording in the making.
+pub struct RerunLog {
+    rec: RecordingStream,
+    paths: Paths,
+    domain: Rect,
+    quantities: HashMap<String, Quantity>,
+    particle_quantity: Option<Quantity>,
+    /// Scalars that are also wanted as logarithms.
+    logarithms: HashSet<String>,
+    files: Vec<RrdFile>,
+    viewers: Vec<Live>,
+    page: Option<Page>,
+    notices: Vec<String>,
+    checked: Instant,
+    /// Class numbers as last recorded: repeated only if they change.
+    classes: Vec<u16>,
+    /// Whether particles were last coloured by a number.
+    colored: bool,
+    /// Colour scales as last recorded, by the entity of their bar.
+    scales: HashMap<EntityPath, ColorScale>,
+    /// Entities of isolines last drawn, to be wiped when they are gone.
+    isolines: HashSet<EntityPath>,
+    pictures: u64,
+}
+
+/// What became of a recording.
+pub struct Finished {
+    /// Files that are complete now.
+    pub saved: Vec<Saved>,
+    /// How many pictures were recorded.
+    pub pictures: u64,
+    /// Viewers that were lost on the way, in words.
+    pub notices: Vec<String>,
+    /// The page, if there is one; it is served until this is dropped.
+    pub served: Option<Served>,
+}
+
+/// A page that still shows a finished recording.
+pub struct Served {
+    _rec: RecordingStream,
+    page: Page,
+}
+
+impl Served {
+    /// What to open in a browser.
+    pub fn url(&self) -> &str {
+        &self.page.url
+    }
+}
+
+impl RerunLog {
+    /// Starts a recording: destinations, layout and all that does not change.
+    pub fn open(info: &RunInfo, sinks: &[Sink]) -> Result<Self, RecordError> {
+        let to = Destinations::open(sinks)?;
+        let mut builder = rerun::RecordingStreamBuilder::new(APPLICATION)
+            .recording_id(info.recording_id.as_str())
+            // The RERUN environment variable must not silence a recording that was asked for.
+            .enabled(true);
+        if to.viewers.is_empty() {
+            builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
+                flush_tick: FILE_TICK,
+                ..Default::default()
+            });
+        }
+        let rec = builder.set_sinks(to.sinks)?;
+        rec.set_log_time_enabled(false);
+        rec.set_log_tick_enabled(false);
+
+        let paths = Paths::new(&info.name);
+        blueprint::send(&rec, info, &paths)?;
+        rec.send_recording_name(info.name.as_str())?;
+        let mut log = Self {
+            rec,
+            paths,
+            domain: info.domain,
+            quantities: (info.fields.iter())
+                .map(|field| (field.name.clone(), field.clone()))
+                .collect(),
+            particle_quantity: info.particle_quantity.clone(),
+            logarithms: (info.plots.iter())
+                .filter(|plot| plot.log10)
+                .flat_map(|plot| plot.series.iter().map(|series| series.path.clone()))
+                .collect(),
+            files: to.files,
+            viewers: to.viewers,
+            page: to.page,
+            notices: Vec::new(),
+            checked: Instant::now(),
+            classes: Vec::new(),
+            colored: false,
+            scales: HashMap::new(),
+            isolines: HashSet::new(),
+            pictures: 0,
+        };
+        log.world(info)?;
+        log.texts(info)?;
+        log.curves(info)?;
+        log.check()?;
+        // A viewer that is absent from the start is a mistake in the command.
+        log.viewers.iter().try_for_each(Live::check)?;
+        Ok(log)
+    }
+
+    /// What to open in a browser, if the recording is served.
+    pub fn url(&self) -> Option<&str> {
+        self.page.as_ref().map(|page| page.url.as_str())
+    }
+
+    /// Viewers lost so far, in words; each is told once.
+    pub fn take_notices(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notices)
+    }
+
+    /// Records one step.
+    pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
+        let step = i64::try_from(frame.step).unwrap_or(i64::MAX);
+        self.rec.set_duration_secs(SIM_TIME, frame.time_s);
+        self.rec.set_time_sequence(STEP, step);
+        self.rec.set_duration_secs(WALL_TIME, frame.wall_s);
+
+        if let Some(picture) = &frame.picture {
+            self.picture(picture)?;
+            self.pictures += 1;
+        }
+        for scalar in &frame.scalars {
+            self.scalar(scalar)?;
+        }
+        for warning in &frame.warnings {
+            self.rec.log(
+                self.paths.at("log"),
+                &archetypes::TextLog::new(warning.as_str())
+                    .with_level(rerun::components::TextLogLevel::WARN),
+            )?;
+        }
+        if self.checked.elapsed() > CHECK_EVERY {
+            self.check()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the recording and makes sure that all of it arrived.
+    pub fn finish(mut self) -> Result<Finished, RecordError> {
+        self.check()?;
+        let saved = self.files.iter().map(RrdFile::finish);
+        let saved = saved.collect::<Result<Vec<_>, _>>()?;
+        Ok(Finished {
+            saved,
+            pictures: self.pictures,
+            notices: self.notices,
+            served: self.page.map(|page| Served {
+                _rec: self.rec,
+                page,
+            }),
+        })
+    }
+
+    /// Waits until everything recorded so far has arrived.
+    fn check(&mut self) -> Result<(), RecordError> {
+        // The result is that of the worst destination; which one it was, and
+        // whether it matters, is asked below.
+        let flushed = self.rec.flush_with_timeout(CHECK_PATIENCE);
+        self.checked = Instant::now();
+        for file in &self.files {
+            file.check()?;
+        }
+        if let (Err(error), Some(file)) = (&flushed, self.files.first())
+            && matches!(error, rerun::sink::SinkFlushError::Timeout)
+            && self.viewers.is_empty()
+        {
+            return Err(file.late());
+        }
+        let mut lost = None;
+        self.viewers.retain(|viewer| match viewer.check() {
+            Ok(()) => true,
+            Err(error) => {
+                self.notices.push(error.to_string());
+                lost = Some(error);
+                false
+            }
+        });
+        match lost {
+            Some(error) if self.files.is_empty() && self.viewers.is_empty() => Err(error),
+            _ => Ok(()),
+        }
+    }
+
+    /// Walls, gauges, legends, and the transform that turns y up.
+    fn world(&mut self, info: &RunInfo) -> Result<(), RecordError> {
+        let world = self.paths.at("world");
+        self.rec.log_static(
+            world.clone(),
+            &archetypes::Transform3D::from_scale([1.0, -1.0, 1.0]),
+        )?;
+        let classes = info.materials.iter().enumerate().map(|(i, material)| {
+            let id = u16::try_from(i).unwrap_or(u16::MAX);
+            (id, material.name.as_str(), rgb8(material.rgb))
+        });
+        self.rec.log_static(
+            world,
+            &archetypes::AnnotationContext::new(classes.map(rerun::ClassDescription::from)),
+        )?;
+        self.rec.log_static(
+            self.paths.at("world/particles"),
+            &archetypes::Points2D::update_fields()
+                .with_radii([Radius::new_scene_units(info.particle_radius)])
+                .with_show_labels(false)
+                .with_draw_order(depth::PARTICLES),
+        )?;
+        let walls = info.walls.iter();
+        self.rec.log_static(
+            self.paths.at("world/walls"),
+            &archetypes::LineStrips2D::new(walls.clone().map(|wall| wall.points.as_slice()))
+                .with_labels(walls.map(|wall| wall.name.as_str()))
+                .with_show_labels(false)
+                .with_colors([rgb(WALL)])
+                .with_radii([Radius::new_ui_points(2.5)])
+                .with_draw_order(depth::WALLS),
+        )?;
+        if !info.gauges.is_empty() {
+            let gauges = info.gauges.iter();
+            self.rec.log_static(
+                self.paths.at("world/gauges"),
+                &archetypes::LineStrips2D::new(gauges.clone().map(|gauge| gauge.points.as_slice()))
+                    .with_colors([rgb(GAUGE)])
+                    .with_radii([Radius::new_ui_points(1.5)])
+                    .with_draw_order(depth::GAUGES),
+            )?;
+            let named = gauges.map(|gauge| (middle(&gauge.points), gauge.name.as_str()));
+            self.names("world/gauges/names", named)?;
+        }
+        // One material needs no legend, and a colour bar stands in its place.
+        if info.particle_quantity.is_none() && info.materials.len() > 1 {
+            let materials = info.materials.iter();
+            let row = bar::row(info.domain, info.materials.len());
+            self.rec.log_static(
+                self.paths.at("world/materials"),
+                &archetypes::Points2D::new(row.clone())
+                    .with_colors(materials.clone().map(|material| rgb(material.rgb)))
+                    .with_radii([Radius::new_ui_points(7.0)])
+                    .with_draw_order(depth::LEGEND),
+            )?;
+            let named = row.zip(materials.map(|material| material.name.as_str()));
+            self.names("world/materials/names", named)?;
+        }
+        Ok(())
+    }
+
+    /// Writes names below points. They are entities of their own because a
+    /// label takes the colour of what it labels, which may be hard to read.
+    fn names<'a>(
+        &self,
+        path: &str,
+        named: impl Iterator<Item = ([f32; 2], &'a str)>,
+    ) -> Result<(), RecordError> {
+        let (points, names): (Vec<_>, Vec<_>) = named.unzip();
+        self.rec.log_static(
+            self.paths.at(path),
+            &archetypes::Points2D::new(points)
+                .with_labels(names)
+                .with_show_labels(true)
+                .with_colors([rgb(INK)])
+                .with_radii([Radius::new_ui_points(0.0)])
+                .with_draw_order(depth::LEGEND),
+        )?;
+        Ok(())
+    }
+
+    fn texts(&self, info: &RunInfo) -> Result<(), RecordError> {
+        // A fence longer than any inside the text cannot be closed by it.
+        let mut fence = "```".to_owned();
+        while info.scene_toml.contains(&fence) {
+            fence.push('`');
+        }
+        let scene = format!("{fence}toml\n{}\n{fence}\n", info.scene_toml.trim_end());
+        for (path, text) in [("scene", scene), ("plan", info.plan_markdown.clone())] {
+            self.rec.log_static(
+                self.paths.at(path),
+                &archetypes::TextDocument::from_markdown(text),
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Names and colours of the curves.
+    fn curves(&self, info: &RunInfo) -> Result<(), RecordError> {
+        for plot in &info.plots {
+            for (series, color) in plot.series.iter().zip(OKABE_ITO.iter().cycle()) {
+                let name = if plot.log10 {
+                    format!("log10 {}", series.name)
+                } else {
+                    series.name.clone()
+                };
+                self.rec.log_static(
+                    self.paths.curve(&series.path, plot.log10),
+                    &archetypes::SeriesLines::new()
+                        .with_names([name])
+                        .with_colors([rgb(on_dark(*color))])
+                        .with_widths([1.75]),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    fn scalar(&self, scalar: &Scalar) -> Result<(), RecordError> {
+        self.rec.log(
+            self.paths.at(&scalar.path),
+            &archetypes::Scalars::single(scalar.value),
+        )?;
+        if self.logarithms.contains(&scalar.path) {
+            let exponent = scalar.value.abs().log10();
+            if exponent.is_finite() {
+                self.rec.log(
+                    self.paths.curve(&scalar.path, true),
+                    &archetypes::Scalars::single(exponent),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    fn picture(&mut self, picture: &Picture) -> Result<(), RecordError> {
+        self.particles(&picture.particles)?;
+        self.rec.log(
+            self.paths.at("world/dye"),
+            &archetypes::LineStrips2D::new(picture.dye_lines.iter().map(Vec::as_slice))
+                .with_colors([rgb(DYE)])
+                .with_radii([Radius::new_ui_points(1.0)])
+                .with_draw_order(depth::DYE),
+        )?;
+        self.rec.log(
+            self.paths.at("world/directors"),
+            &archetypes::LineStrips2D::new(picture.glyphs.iter().map(<[_; 2]>::as_slice))
+                .with_colors([rgb(GLYPH)])
+                .with_radii([Radius::new_ui_points(1.2)])
+                .with_draw_order(depth::GLYPHS),
+        )?;
+        for field in &picture.fields {
+            self.field(field)?;
+        }
+        self.lines(&picture.isolines)
+    }
+
+    fn particles(&mut self, particles: &ParticleSnapshot) -> Result<(), RecordError> {
+        let path = self.paths.at("world/particles");
+        let count = particles.positions.len();
+        expect_length("particle classes", particles.class.len(), count)?;
+        let mut points = archetypes::Points2D::update_fields()
+            .with_positions(particles.positions.iter().copied());
+        if self.classes != particles.class {
+            self.classes.clone_from(&particles.class);
+            points = points.with_class_ids(particles.class.iter().copied());
+        }
+        if let Some(scalar) = &particles.scalar {
+            expect_length("particle values", scalar.values.len(), count)?;
+            let signed = self.particle_quantity.as_ref().is_some_and(|q| q.signed);
+            let scale = ColorScale::new(scalar.range, signed);
+            points = points.with_colors(scalar.values.iter().map(|&value| {
+                let [r, g, b, a] = scale.color(value);
+                Color::from_unmultiplied_rgba(r, g, b, a)
+            }));
+            self.scale_bar(&self.paths.at("world/scale"), scale)?;
+            self.colored = true;
+        } else if self.colored {
+            points = points.with_colors(std::iter::empty::<Color>());
+            self.colored = false;
+        }
+        self.rec.log(path, &points)?;
+        Ok(())
+    }
+
+    fn field(&mut self, field: &GridField) -> Result<(), RecordError> {
+        expect_length(
+            &format!("field {}", field.name),
+            field.values.len(),
+            field.nx * field.ny,
+        )?;
+        let signed = self
+            .quantities
+            .get(&field.name)
+            .is_some_and(|quantity| quantity.signed);
+        let scale = ColorScale::new(field.range, signed);
+        let path = self.paths.field(&field.name);
+        let [x, y] = field.origin;
+        let [dx, dy] = field.cell;
+        self.rec.log(
+            path.join(&"image".into()),
+            &[
+                &archetypes::Transform3D::from_translation_scale([x, y, 0.0], [dx, dy, 1.0])
+                    as &dyn rerun::AsComponents,
+                &archetypes::Image::from_rgba32(
+                    scale.image(&field.values),
+                    [length(field.nx), length(field.ny)],
+                )
+                .with_magnification_filter(MagnificationFilter::Linear)
+                .with_draw_order(depth::FIELD),
+            ],
+        )?;
+        self.scale_bar(&path, scale)
+    }
+
+    /// A colour bar with numbers, drawn again when its ends change.
+    fn scale_bar(&mut self, path: &EntityPath, scale: ColorScale) -> Result<(), RecordError> {
+        let last = self.scales.insert(path.clone(), scale);
+        if last == Some(scale) {
+            return Ok(());
+        }
+        let place = bar::place(self.domain);
+        let [width, height] = place.size();
+        let [low, high] = scale.ends();
+        if last.is_none() {
+            const STEPS: u32 = 128;
+            let ramp = (0..STEPS).map(|i| i as f32 / (STEPS - 1) as f32);
+            let ramp: Vec<f32> = ramp.collect();
+            let colors = if scale.is_signed() {
+                ColorScale::new([-1.0, 1.0], true)
+                    .image(&ramp.iter().map(|x| 2.0 * x - 1.0).collect::<Vec<_>>())
+            } else {
+                ColorScale::new([0.0, 1.0], false).image(&ramp)
+            };
+            self.rec.log_static(
+                path.join(&"bar".into()),
+                &[
+                    &archetypes::Transform3D::from_translation_scale(
+                        [place.min[0], place.min[1], 0.0],
+                        [width / STEPS as f32, height, 1.0],
+                    ) as &dyn rerun::AsComponents,
+                    &archetypes::Image::from_rgba32(colors, [STEPS, 1])
+                        .with_draw_order(depth::LEGEND),
+                ],
+            )?;
+        }
+        let middle = 0.5 * (low + high);
+        let at = |share: f32| [place.min[0] + share * width, place.min[1]];
+        self.rec.log(
+            path.join(&"ticks".into()),
+            &archetypes::Points2D::new([at(0.0), at(0.5), at(1.0)])
+                .with_labels([low, middle, high].map(|value| short(f64::from(value))))
+                .with_show_labels(true)
+                .with_colors([rgb(INK)])
+                .with_radii([Radius::new_ui_points(2.0)])
+                .with_draw_order(depth::LEGEND),
+        )?;
+        Ok(())
+    }
+
+    fn lines(&mut self, isolines: &[Isoline]) -> Result<(), RecordError> {
+        let mut groups: HashMap<EntityPath, Vec<&Isoline>> = HashMap::new();
+        for line in isolines {
+            let path = if self.quantities.contains_key(&line.field) {
+                self.paths.field(&line.field).join(&"isolines".into())
+            } else {
+                let part = EntityPathPart::new(line.field.clone());
+                self.paths
+                    .at("world/isolines")
+                    .join(&EntityPath::new(vec![part]))
+            };
+            groups.entry(path).or_default().push(line);
+        }
+        for gone in self
+            .isolines
+            .iter()
+            .filter(|path| !groups.contains_key(path))
+        {
+            self.rec.log(gone.clone(), &archetypes::Clear::flat())?;
+        }
+        for (path, lines) in &groups {
+            let strips = lines.iter().flat_map(|line| {
+                // One label per level: on its longest strip.
+                let longest = (line.strips.iter().enumerate())
+                    .max_by_key(|(_, strip)| strip.len())
+                    .map(|(i, _)| i);
+                line.strips.iter().enumerate().map(move |(i, strip)| {
+                    let label = if Some(i) == longest {
+                        short(f64::from(line.level))
+                    } else {
+                        String::new()
+                    };
+                    (strip.as_slice(), label)
+                })
+            });
+            let (strips, labels): (Vec<_>, Vec<_>) = strips.unzip();
+            self.rec.log(
+                path.clone(),
+                &archetypes::LineStrips2D::new(strips)
+                    .with_labels(labels)
+                    .with_show_labels(true)
+                    .with_colors([rgb(LINE)])
+                    .with_radii([Radius::new_ui_points(0.8)])
+                    .with_draw_order(depth::ISOLINES),
+            )?;
+        }
+        self.isolines = groups.into_keys().collect();
+        Ok(())
+    }
+}
+
+fn rgb([r, g, b]: [u8; 3]) -> Color {
+    Color::from_rgb(r, g, b)
+}
+
+fn rgb8([r, g, b]: [u8; 3]) -> rerun::Rgba32 {
+    rerun::Rgba32::from_rgb(r, g, b)
+}
+
+/// A colour of curves, lifted where it would drown in the viewer's dark theme.
+fn on_dark(color: [u8; 3]) -> [u8; 3] {
+    match color {
+        [0, 0, 0] => [220, 220, 220],
+        [0, 114, 178] => [64, 160, 224],
+        other => other,
+    }
+}
+
+/// The point halfway between the ends of a polyline.
+fn middle(points: &[[f32; 2]]) -> [f32; 2] {
+    match (points.first(), points.last()) {
+        (Some(a), Some(b)) => [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])],
+        _ => [0.0, 0.0],
+    }
+}
+
+fn length(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
+}
+
+fn expect_length(what: &str, found: usize, expected: usize) -> Result<(), RecordError> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(RecordError::Length {
+            what: what.to_owned(),
+            found,
+            expected,
+        })
+    }
+}

@@ -1,0 +1,309 @@
+//! Where a recording goes, and whether it got there.
+//!
+//! Rerun logs asynchronously and tells nobody when the disk is full. Here each
+//! destination keeps its first fault, and a fault is an error of the recording
+//! only if nothing else still receives it.
+
+use std::fs::File;
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use rerun::external::re_build_info::CrateVersion;
+use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
+use rerun::external::{re_grpc_server, re_uri};
+use rerun::log::LogMsg;
+use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
+
+use super::RecordError;
+
+/// How long a viewer may take to swallow what was sent before it is given up.
+const VIEWER_PATIENCE: Duration = Duration::from_secs(5);
+
+/// History a server keeps for viewers that connect late.
+///
+/// Half of what a 1 GiB process may spend: the same frames are held once more
+/// by the viewer itself, often on the same machine.
+const SERVER_HISTORY_BYTES: u64 = 512 * 1024 * 1024;
+
+/// A destination of the recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Sink {
+    /// An `.rrd` file.
+    Save(PathBuf),
+    /// A viewer that already listens, such as `rerun+http://127.0.0.1:9876/proxy`.
+    Connect(String),
+    /// A page served from this process, to this machine only.
+    Serve {
+        /// Port of the page; 0 takes any free one.
+        web_port: u16,
+        /// Port of the data; 0 takes any free one.
+        grpc_port: u16,
+    },
+    /// The `rerun` viewer found on the path, started now.
+    Spawn,
+}
+
+/// First fault of a destination, shared between its sink and the recorder.
+type Fault = Arc<Mutex<Option<String>>>;
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An `.rrd` file. Rerun's own `FileSink` writes the same bytes, but only logs
+/// why it failed.
+#[derive(Clone)]
+pub(super) struct RrdFile {
+    path: PathBuf,
+    encoder: Arc<Mutex<Encoder<File>>>,
+    fault: Fault,
+}
+
+impl RrdFile {
+    pub(super) fn create(path: &Path) -> Result<Self, RecordError> {
+        let failed = |cause: String| RecordError::Write {
+            path: path.to_owned(),
+            cause,
+        };
+        let file = File::create(path).map_err(|e| failed(e.to_string()))?;
+        let encoder = Encoder::new_eager(
+            CrateVersion::LOCAL,
+            EncodingOptions::PROTOBUF_COMPRESSED,
+            file,
+        )
+        .map_err(|e| failed(e.to_string()))?;
+        Ok(Self {
+            path: path.to_owned(),
+            encoder: Arc::new(Mutex::new(encoder)),
+            fault: Fault::default(),
+        })
+    }
+
+    pub(super) fn check(&self) -> Result<(), RecordError> {
+        match lock(&self.fault).clone() {
+            None => Ok(()),
+            Some(cause) => Err(RecordError::Write {
+                path: self.path.clone(),
+                cause,
+            }),
+        }
+    }
+
+    /// The error of a file that takes no more data, without saying why.
+    pub(super) fn late(&self) -> RecordError {
+        RecordError::Write {
+            path: self.path.clone(),
+            cause: "the disk does not answer".to_owned(),
+        }
+    }
+
+    /// Writes the footer. To be called when nothing more will be sent.
+    pub(super) fn finish(&self) -> Result<Saved, RecordError> {
+        self.check()?;
+        let failed = |cause: String| RecordError::Write {
+            path: self.path.clone(),
+            cause,
+        };
+        let mut encoder = lock(&self.encoder);
+        encoder.finish().map_err(|e| failed(e.to_string()))?;
+        encoder
+            .flush_blocking()
+            .map_err(|e| failed(e.to_string()))?;
+        let size = std::fs::metadata(&self.path).map_err(|e| failed(e.to_string()))?;
+        Ok(Saved {
+            path: self.path.clone(),
+            bytes: size.len(),
+        })
+    }
+}
+
+impl LogSink for RrdFile {
+    fn send(&self, msg: LogMsg) {
+        let mut fault = lock(&self.fault);
+        if fault.is_none()
+            && let Err(error) = lock(&self.encoder).append(&msg)
+        {
+            *fault = Some(error.to_string());
+        }
+    }
+
+    fn flush_blocking(&self, _timeout: Duration) -> Result<(), SinkFlushError> {
+        match &*lock(&self.fault) {
+            None => Ok(()),
+            Some(cause) => Err(SinkFlushError::failed(cause.clone())),
+        }
+    }
+}
+
+/// A file that was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Saved {
+    /// Where it is.
+    pub path: PathBuf,
+    /// How large it is.
+    pub bytes: u64,
+}
+
+/// A viewer, near or far. After its first fault nothing more is sent to it.
+#[derive(Clone)]
+pub(super) struct Live {
+    name: String,
+    fault: Fault,
+}
+
+impl Live {
+    pub(super) fn check(&self) -> Result<(), RecordError> {
+        match lock(&self.fault).clone() {
+            None => Ok(()),
+            Some(cause) => Err(RecordError::Viewer {
+                name: self.name.clone(),
+                cause,
+            }),
+        }
+    }
+}
+
+struct LiveSink {
+    fault: Fault,
+    inner: Box<dyn LogSink>,
+}
+
+impl LogSink for LiveSink {
+    fn send(&self, msg: LogMsg) {
+        if lock(&self.fault).is_none() {
+            self.inner.send(msg);
+        }
+    }
+
+    fn flush_blocking(&self, timeout: Duration) -> Result<(), SinkFlushError> {
+        let mut fault = lock(&self.fault);
+        if let Some(cause) = &*fault {
+            return Err(SinkFlushError::failed(cause.clone()));
+        }
+        let result = self.inner.flush_blocking(timeout.min(VIEWER_PATIENCE));
+        if let Err(error) = &result {
+            *fault = Some(error.to_string());
+        }
+        result
+    }
+}
+
+/// A page that shows the recording in a browser, for as long as this lives.
+pub(super) struct Page {
+    pub(super) url: String,
+    /// Stops serving when dropped.
+    _server: Box<dyn std::any::Any + Send>,
+}
+
+/// All destinations of one recording.
+#[derive(Default)]
+pub(super) struct Destinations {
+    pub(super) sinks: Vec<Box<dyn LogSink>>,
+    pub(super) files: Vec<RrdFile>,
+    pub(super) viewers: Vec<Live>,
+    pub(super) page: Option<Page>,
+}
+
+impl Destinations {
+    pub(super) fn open(sinks: &[Sink]) -> Result<Self, RecordError> {
+        let mut all = Self::default();
+        for sink in sinks {
+            match sink {
+                Sink::Save(path) => {
+                    let file = RrdFile::create(path)?;
+                    all.files.push(file.clone());
+                    all.sinks.push(Box::new(file));
+                }
+                Sink::Connect(url) => all.connect(url)?,
+                Sink::Serve {
+                    web_port,
+                    grpc_port,
+                } => all.serve(*web_port, *grpc_port)?,
+                Sink::Spawn => all.spawn()?,
+            }
+        }
+        Ok(all)
+    }
+
+    fn add_viewer(&mut self, name: String, inner: Box<dyn LogSink>) {
+        let fault = Fault::default();
+        self.sinks.push(Box::new(LiveSink {
+            fault: Arc::clone(&fault),
+            inner,
+        }));
+        self.viewers.push(Live { name, fault });
+    }
+
+    fn connect(&mut self, url: &str) -> Result<(), RecordError> {
+        let uri: re_uri::ProxyUri = url.parse().map_err(|e| RecordError::Viewer {
+            name: url.to_owned(),
+            cause: format!("{e}; an address looks like {}", rerun::DEFAULT_CONNECT_URL),
+        })?;
+        self.add_viewer(url.to_owned(), Box::new(GrpcSink::new(uri)));
+        Ok(())
+    }
+
+    fn spawn(&mut self) -> Result<(), RecordError> {
+        let options = rerun::SpawnOptions {
+            hide_welcome_screen: true,
+            wait_for_bind: true,
+            ..Default::default()
+        };
+        let viewer = rerun::spawn(&options).map_err(|e| RecordError::Viewer {
+            name: "rerun".to_owned(),
+            cause: e.to_string(),
+        })?;
+        self.connect(&format!("rerun+http://127.0.0.1:{}/proxy", viewer.port))
+    }
+
+    fn serve(&mut self, web_port: u16, grpc_port: u16) -> Result<(), RecordError> {
+        let host = Ipv4Addr::LOCALHOST.to_string();
+        let [grpc_port, web_port] = claim([grpc_port, web_port])?;
+        let data = rerun::grpc_server::GrpcServerSink::new(
+            &host,
+            grpc_port,
+            re_grpc_server::ServerOptions {
+                memory_limit: rerun::MemoryLimit::from_bytes(SERVER_HISTORY_BYTES),
+                ..Default::default()
+            },
+        )
+        .map_err(|e| RecordError::Viewer {
+            name: format!("port {grpc_port}"),
+            cause: e.to_string(),
+        })?;
+        let page = rerun::serve_web_viewer(rerun::web_viewer::WebViewerConfig {
+            bind_ip: host.clone(),
+            web_port: web_port.into(),
+            open_browser: false,
+            ..Default::default()
+        })
+        .map_err(|e| RecordError::Viewer {
+            name: format!("port {web_port}"),
+            cause: e.to_string(),
+        })?;
+        self.page = Some(Page {
+            url: format!(
+                "http://{host}:{web_port}/?url=rerun%2Bhttp%3A%2F%2F{host}%3A{grpc_port}%2Fproxy"
+            ),
+            _server: Box::new(page),
+        });
+        self.add_viewer(format!("page on port {web_port}"), Box::new(data));
+        Ok(())
+    }
+}
+
+/// Makes sure that ports of this machine are free, and finds some for 0.
+///
+/// Rerun's server thread would report a busy port to nobody.
+fn claim(ports: [u16; 2]) -> Result<[u16; 2], RecordError> {
+    let bind = |port| {
+        TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+            .and_then(|listener| Ok((listener.local_addr()?.port(), listener)))
+            .map_err(|source| RecordError::Port { port, source })
+    };
+    // Both are held until both are known, so that they differ.
+    let (first, second) = (bind(ports[0])?, bind(ports[1])?);
+    Ok([first.0, second.0])
+}
