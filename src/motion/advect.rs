@@ -19,9 +19,14 @@ pub fn advance(
     let mesh = carrier.mesh;
     let mut left = Vec::new();
     for cell in 0..mesh.cells() {
-        for p in particles.of_cell(cell) {
+        let members = particles.of_cell(cell);
+        if members.is_empty() {
+            continue;
+        }
+        let home = carrier.home(cell);
+        for p in members {
             let from = particles.position[p];
-            let journey = carrier.travel(cell, from);
+            let journey = carrier.travel(&home, from);
             count.held += u64::from(journey.held);
             let material = particles.material[p];
             let volume = particles.volume[p];

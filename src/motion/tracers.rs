@@ -34,7 +34,7 @@ impl DyeLines {
             line.retain_mut(|p| {
                 let inside = mesh.wrap(*p);
                 let offset = [p[0] - inside[0], p[1] - inside[1]];
-                match carrier.travel(mesh.locate(inside), inside).to {
+                match carrier.travel(&carrier.home(mesh.locate(inside)), inside).to {
                     Some(q) => {
                         *p = [q[0] + offset[0], q[1] + offset[1]];
                         true

@@ -143,18 +143,6 @@ impl Plan {
             &[],
         );
         add(
-            "background without particles",
-            self.background().is_some(),
-            why(
-                self.background().is_some(),
-                format!("{}: particles only in a band around the others", names(&|m| m.background)),
-                "no material is a background",
-            ),
-            0,
-            0,
-            &[],
-        );
-        add(
             "carried viscosity",
             e.carried_viscosity,
             why(e.carried_viscosity, names(&|m| m.carries_viscosity), "every viscosity is constant"),

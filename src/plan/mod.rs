@@ -205,7 +205,7 @@ impl Plan {
         if self.effects.rotation { 3 } else { 2 }
     }
 
-    /// Index of the material that needs no particles where it is alone.
+    /// Index of the material that fills what regions leave free.
     pub fn background(&self) -> Option<u8> {
         self.state.materials.iter().position(|m| m.background).map(|m| m as u8)
     }

@@ -156,7 +156,6 @@ impl Summary {
             population: [
                 ("splits", count.splits),
                 ("merges", count.merges),
-                ("reseeded_background", count.reseeded),
                 ("held_at_walls", count.held),
                 ("left_through_open_sides", count.left),
                 ("healed_cells", count.healed),

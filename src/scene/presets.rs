@@ -4,7 +4,15 @@ use super::error::{SceneError, suggestion};
 use super::load::{SceneSource, parse};
 
 /// Names and texts.
-const PRESETS: [(&str, &str); 1] = [("silo", include_str!("../../presets/silo.toml"))];
+const PRESETS: [(&str, &str); 7] = [
+    ("silo", include_str!("../../presets/silo.toml")),
+    ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
+    ("couette_cosserat", include_str!("../../presets/couette_cosserat.toml")),
+    ("poiseuille_cosserat", include_str!("../../presets/poiseuille_cosserat.toml")),
+    ("rayleigh_taylor", include_str!("../../presets/rayleigh_taylor.toml")),
+    ("silo_pencils", include_str!("../../presets/silo_pencils.toml")),
+    ("hydrostatic", include_str!("../../presets/hydrostatic.toml")),
+];
 
 /// Names and one-line descriptions, in the order to show them.
 pub fn list() -> Vec<(&'static str, String)> {

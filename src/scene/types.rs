@@ -153,7 +153,7 @@ pub struct Material {
     /// Viscosities from contacts between grains, instead of giving them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub granular: Option<Granular>,
-    /// Fills what the regions leave free, without particles where it is alone.
+    /// Fills what the regions leave free; carries no history and is not drawn.
     #[serde(default)]
     pub background: bool,
     /// Colour in pictures, `#rrggbb`; default from a colour-blind safe palette.

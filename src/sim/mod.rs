@@ -163,11 +163,7 @@ impl<const D: usize> Simulation<D> {
         let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
         let stokes = Stokes::new(mesh.clone(), constraints)?;
         let mut particles = initial::particles(&plan)?;
-        let population = Population {
-            seeding: plan.method.seeding,
-            background: plan.background(),
-            band: plan.clock.courant.ceil() as usize,
-        };
+        let population = Population { seeding: plan.method.seeding };
         let mut count = Count::default();
         population.control(&mesh, &mut particles, &mut count);
         let mut fixed_load = vec![[0.0; D]; mesh.nodes()];

@@ -1,11 +1,8 @@
-//! Population control: no cell of a particle material runs empty or overfull.
+//! Population control: no cell runs empty or overfull.
 //!
 //! A cell that lacks particles, or has none in one of its quadrants, splits the particle nearest
 //! to the gap: the child takes half of its volume. An overfull cell merges its closest pairs of
-//! one material. Volume is kept material by material; directors are averaged as axes. The
-//! background carries no history, so it has particles only in a band around other materials:
-//! outside it they are dropped, and cells of the band that hold nothing else are kept full, so
-//! that what flows into cut cells is accounted for.
+//! one material. Volume is kept material by material; directors are averaged as axes.
 
 use super::mesh::Mesh;
 use super::particles::Particles;
@@ -17,8 +14,6 @@ use crate::laws::director;
 pub struct Count {
     pub splits: u64,
     pub merges: u64,
-    /// Background particles placed in or removed from the band.
-    pub reseeded: u64,
     /// Particles held back at walls that their step would have crossed.
     pub held: u64,
     /// Particles that left through an open side.
@@ -31,127 +26,17 @@ pub struct Count {
 #[derive(Clone, Copy, Debug)]
 pub struct Population {
     pub seeding: Seeding,
-    pub background: Option<u8>,
-    /// Width of the background's band in cells.
-    pub band: usize,
 }
 
 impl Population {
     /// Restores the bounds. `particles` must be sorted, and are sorted on return.
     pub fn control(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
-        if let Some(background) = self.background {
-            self.follow_band(mesh, particles, background, count);
-        }
         self.merge(mesh, particles, count);
         self.split(mesh, particles, count);
     }
 
     fn target(&self) -> usize {
         self.seeding.count()
-    }
-
-    /// Cells within `band` cells of one that holds a particle of another material.
-    pub fn band_cells(&self, mesh: &Mesh, particles: &Particles, background: u8) -> Vec<bool> {
-        let mut near: Vec<bool> = (0..mesh.cells())
-            .map(|c| particles.material[particles.of_cell(c)].iter().any(|&m| m != background))
-            .collect();
-        for _ in 0..self.band {
-            // Two sweeps, so that diagonal neighbours are reached.
-            for axis in 0..2 {
-                let before = near.clone();
-                for c in (0..mesh.cells()).filter(|&c| before[c]) {
-                    let (i, j) = mesh.cell_ij(c);
-                    for n in mesh.neighbours(c) {
-                        let (ni, nj) = mesh.cell_ij(n);
-                        if (axis == 0 && nj == j) || (axis == 1 && ni == i) {
-                            near[n] = true;
-                        }
-                    }
-                }
-            }
-        }
-        near
-    }
-
-    fn follow_band(
-        &self,
-        mesh: &Mesh,
-        particles: &mut Particles,
-        background: u8,
-        count: &mut Count,
-    ) {
-        let near = self.band_cells(mesh, particles, background);
-        let mut gone = vec![false; particles.len()];
-        let mut any = false;
-        for c in (0..mesh.cells()).filter(|&c| !near[c]) {
-            for p in particles.of_cell(c) {
-                gone[p] = true;
-                any = true;
-            }
-        }
-        let mut changed = false;
-        for c in (0..mesh.cells()).filter(|&c| near[c] && !mesh.solid[c]) {
-            let range = particles.of_cell(c);
-            if particles.material[range.clone()].iter().all(|&m| m == background) {
-                changed |= self.restore(mesh, particles, c, &mut gone, background, count);
-            }
-        }
-        if any || changed {
-            count.reseeded += gone.iter().filter(|&&g| g).count() as u64;
-            gone.resize(particles.len(), false);
-            particles.remove(&gone);
-            particles.sort(mesh);
-        }
-    }
-
-    /// Brings a cell of background alone back to its full volume: what flows in from cells
-    /// without particles brings none. Fills empty subcells, takes from crowded ones.
-    fn restore(
-        &self,
-        mesh: &Mesh,
-        particles: &mut Particles,
-        cell: usize,
-        gone: &mut [bool],
-        background: u8,
-        count: &mut Count,
-    ) -> bool {
-        let side = self.seeding.side;
-        let volume = mesh.cell_area(cell) / self.target() as f64;
-        let mut subcells = vec![Vec::new(); self.target()];
-        let mut missing = mesh.cell_area(cell);
-        for p in particles.of_cell(cell) {
-            let r = mesh.to_reference(cell, particles.position[p]);
-            let at = |t: f64| ((0.5 * (t + 1.0) * side as f64) as usize).min(side - 1);
-            subcells[at(r[1]) * side + at(r[0])].push(p);
-            missing -= particles.volume[p];
-        }
-        let mut changed = false;
-        for members in subcells.iter_mut() {
-            while members.len() > 1 && missing < -0.5 * volume {
-                let Some(p) = members.pop() else { break };
-                gone[p] = true;
-                missing += particles.volume[p];
-                changed = true;
-            }
-        }
-        for (k, members) in subcells.iter().enumerate() {
-            if members.is_empty() && missing > 0.5 * volume {
-                let at = |k: usize| (2 * k + 1) as f64 / side as f64 - 1.0;
-                let place = mesh.from_reference(cell, [at(k % side), at(k / side)]);
-                particles.push(place, volume, background);
-                missing -= volume;
-                count.reseeded += 1;
-                changed = true;
-            }
-        }
-        // The rest goes to the volumes of all: the cell is full exactly.
-        let kept: Vec<usize> = particles.of_cell(cell).filter(|&p| !gone[p]).collect();
-        let total: f64 = kept.iter().map(|&p| particles.volume[p]).sum();
-        if total > 0.0 {
-            let factor = 1.0 + missing / total;
-            kept.iter().for_each(|&p| particles.volume[p] *= factor);
-        }
-        changed
     }
 
     fn split(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
@@ -161,7 +46,7 @@ impl Population {
         for cell in 0..mesh.cells() {
             let mut members: Vec<usize> = particles.of_cell(cell).collect();
             if members.is_empty() {
-                if self.background.is_none() && !mesh.solid[cell] {
+                if !mesh.solid[cell] {
                     emptied.push(cell);
                 }
                 continue;
