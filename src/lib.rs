@@ -1,4 +1,5 @@
 //! grainscope
+pub mod cases;
 pub mod commands;
 pub mod frame;
 pub mod laws;

@@ -30,7 +30,7 @@ const PALETTE: [[u8; 3]; 8] = [
     [120, 120, 120],
 ];
 const BACKGROUND_COLOUR: [u8; 3] = [190, 196, 204];
-const MARK_COLOUR: [u8; 3] = [0, 0, 0];
+const MARK_COLOUR: [u8; 3] = [0, 60, 200];
 
 type Result<T> = std::result::Result<T, SceneError>;
 

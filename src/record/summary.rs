@@ -151,7 +151,11 @@ impl Summary {
                 divergence_error: tally.largest_divergence,
                 volume_error: row.volume_error,
                 director_error: row.director_error,
-                energy_error: if row.dissipated > 0.0 { lost / row.dissipated - 1.0 } else { 0.0 },
+                energy_error: {
+                    // Less than this share of the energy there is, is rounding: the scene is at rest.
+                    let scale = row.dissipated.max(1e-6 * tally.first_energy.abs());
+                    if scale > 0.0 { (lost - row.dissipated) / scale } else { 0.0 }
+                },
             },
             population: [
                 ("splits", count.splits),

@@ -11,6 +11,9 @@ use crate::space::shape::Shape;
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
+/// Powers below this share of what the loads could have are rounding: the scene is at rest.
+const REST: f64 = 1e-6;
+
 /// The row before anything is known.
 pub fn empty_row(plan: &Plan) -> Row {
     Row {
@@ -173,7 +176,10 @@ impl<const D: usize> Simulation<D> {
         };
         let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
         let work = trapezoid(before.work, self.last_other_power, other);
-        let larger = power_in.abs().max(dissipation.abs());
+        let larger = power_in
+            .abs()
+            .max(dissipation.abs())
+            .max(REST * r.load_scale * u.power());
         let drift = self
             .projected_volumes()
             .iter()

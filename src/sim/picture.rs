@@ -208,7 +208,7 @@ impl<const D: usize> Simulation<D> {
             }
         };
         let range = match name {
-            FieldName::Alignment => [0.0, 1.0],
+            FieldName::Alignment => [0.0, 0.7],
             FieldName::Speed => [0.0, range(&values)[1]],
             FieldName::Rotation => symmetric(range(&values)),
             FieldName::Pressure => range(&values),
@@ -236,7 +236,7 @@ impl<const D: usize> Simulation<D> {
         let directors = self.particles.director.as_ref()?;
         let plan = &self.plan;
         let cells = plan.mesh.x.cells().max(plan.mesh.y.cells()) as f64;
-        let raster = Raster::new(plan, cells.min(64.0));
+        let raster = Raster::new(plan, (0.5 * cells).clamp(8.0, 40.0));
         let mut sum = vec![[0.0; 2]; raster.len()];
         for (p, n) in directors.iter().enumerate() {
             let m = &self.matter.materials[self.particles.material[p] as usize];

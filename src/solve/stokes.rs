@@ -30,6 +30,9 @@ use std::time::Instant;
 /// Penalty `r` in units of the cell's viscosity.
 const PENALTY: f64 = 1e4;
 
+/// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
+const RIGID_SHARE: f64 = 1e-3;
+
 /// When the corrections stop.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopping {
@@ -50,6 +53,9 @@ pub struct Report {
     pub power_in: f64,
     /// Viscous dissipation.
     pub dissipation: f64,
+    /// `||f||^2_{1/D}`: the power the loads would have on a mesh of one element; a scale for
+    /// powers that rounding alone makes.
+    pub load_scale: f64,
     /// Rotation unknowns that some Cosserat material acts on.
     pub active_rotation: usize,
     pub seconds: Seconds,
@@ -202,7 +208,8 @@ impl<const D: usize> Stokes<D> {
         self.constraints.impose(&mut flow.velocity);
         loop {
             let residual = self.residual(quadrature, load, flow);
-            (report.residual, report.divergence) = self.norms(&residual, load, flow);
+            (report.residual, report.divergence, report.load_scale) =
+                self.norms(&residual, load, flow);
             report.dissipation = residual.dissipation;
             report.power_in = self.power_in(&residual, load, flow);
             if !(report.residual.is_finite() && report.divergence.is_finite()) {
@@ -357,8 +364,8 @@ impl<const D: usize> Stokes<D> {
         out
     }
 
-    /// Scaled residual and relative divergence.
-    fn norms(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> (f64, f64) {
+    /// Scaled residual, relative divergence, and the loads' own scale of power.
+    fn norms(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> (f64, f64, f64) {
         let (mut rr, mut ff, mut uu) = (0.0, 0.0, 0.0);
         for node in 0..self.mesh.nodes() {
             for c in 0..D {
@@ -373,12 +380,12 @@ impl<const D: usize> Stokes<D> {
                 }
             }
         }
-        // sqrt(ff) is a speed of dissipation per unit viscosity: it keeps both ratios sensible
-        // when nothing moves.
+        // The last two terms keep the ratio sensible when nothing moves, and in a rigid rotation,
+        // where divergence and strain are both rounding.
         let scale = ff.sqrt() + uu.sqrt();
-        let strain = r.strain.sqrt() + ff.sqrt();
+        let strain = r.strain.sqrt() + ff.sqrt() + RIGID_SHARE * uu.sqrt();
         let ratio = |a: f64, b: f64| if a == 0.0 { 0.0 } else { a / b };
-        (ratio(rr.sqrt(), scale), ratio(r.divergence_norm.sqrt(), strain))
+        (ratio(rr.sqrt(), scale), ratio(r.divergence_norm.sqrt(), strain), ff)
     }
 
     /// Power of the loads and of the reactions on moving boundaries.

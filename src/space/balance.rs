@@ -20,6 +20,9 @@ const CONDUCTANCE: f64 = 0.25;
 /// Most of a material's volume that may leave a cell through one face in a sweep.
 const LARGEST_SHARE: f64 = 0.1;
 
+/// Differences of the excess below this are rounding.
+const SMALLEST_DIFFERENCE: f64 = 1e-12;
+
 /// A face that volume may pass, from the left or lower cell to the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Face {
@@ -66,6 +69,8 @@ pub struct Balance {
     /// Index `cell * materials + material`.
     now: Vec<f64>,
     before: Vec<f64>,
+    /// State before a sweep.
+    start: Vec<f64>,
     excess: Vec<f64>,
 }
 
@@ -77,6 +82,7 @@ impl Balance {
             materials,
             now: vec![0.0; size],
             before: vec![0.0; size],
+            start: vec![0.0; size],
             excess: vec![0.0; mesh.cells()],
         }
     }
@@ -106,29 +112,27 @@ impl Balance {
                 self.excess[cell] =
                     if empty { f64::NAN } else { total / mesh.cell_area(cell) - 1.0 };
             }
+            // All fluxes from the state before the sweep: no direction is favoured.
+            self.start.copy_from_slice(&self.now);
             for face in &self.faces {
                 let [a, b] = face.cells.map(|c| c as usize);
                 let difference = self.excess[a] - self.excess[b];
-                if !(difference.abs() > 1e-12) {
+                if !(difference.abs() > SMALLEST_DIFFERENCE) {
                     continue;
                 }
                 let (from, to, sign) = if difference > 0.0 { (a, b, 1.0) } else { (b, a, -1.0) };
                 let area = mesh.cell_area(a).min(mesh.cell_area(b));
                 let flux = CONDUCTANCE * difference.abs() * area;
+                let (here, there) = (&self.start[from * n..][..n], &self.start[to * n..][..n]);
                 // Volume can only pass to particles of its own kind.
-                let common: f64 = (0..n)
-                    .filter(|&m| self.now[to * n + m] > 0.0)
-                    .map(|m| self.now[from * n + m])
-                    .sum();
-                for m in 0..n {
-                    let (here, there) = (self.now[from * n + m], self.now[to * n + m]);
-                    if here > 0.0 && there > 0.0 {
-                        let limit = LARGEST_SHARE * here.min(there);
-                        let volume = (flux * here / common).min(limit);
-                        self.now[from * n + m] -= volume;
-                        self.now[to * n + m] += volume;
-                        passed(face, m as u8, sign * volume);
-                    }
+                let shared = |m: usize| if there[m] > 0.0 { here[m] } else { 0.0 };
+                let common: f64 = (0..n).map(shared).sum();
+                for m in (0..n).filter(|&m| shared(m) > 0.0) {
+                    let limit = LARGEST_SHARE * here[m].min(there[m]);
+                    let volume = (flux * here[m] / common).min(limit);
+                    self.now[from * n + m] -= volume;
+                    self.now[to * n + m] += volume;
+                    passed(face, m as u8, sign * volume);
                 }
             }
         }

@@ -1,0 +1,167 @@
+//! Whole runs: balances, symmetry, rest, and the source's claims on the silo.
+
+use crate::{finish, preset, scene};
+use grainscope::sim::Run;
+
+/// Energy lost by the particles plus work of other loads, against the dissipation.
+fn energy_error(run: &dyn Run, first: f64) -> f64 {
+    let row = run.row();
+    (first - row.potential_energy + row.work) / row.dissipated - 1.0
+}
+
+#[test]
+fn a_heavy_fluid_at_rest_stays_at_rest() {
+    for sets in [&[][..], &["contrast=1e6"], &["accuracy.cells=16", "level=0.25"]] {
+        let mut run = preset("hydrostatic", sets);
+        for _ in 0..3 {
+            run.step().unwrap();
+        }
+        // rho g a^2 / eta
+        let scale = 1000.0 * 10.0 / 100.0;
+        let speed = run.row().max_speed;
+        assert!(speed < 1e-10 * scale, "{sets:?}: {speed}");
+    }
+}
+
+#[test]
+fn a_level_inside_a_cell_moves_less_and_less() {
+    // Regular particles make the layers exactly level, and then nothing moves at all.
+    let sets = ["level=0.52", "accuracy.placement=jittered"];
+    let speed = |cells| preset("hydrostatic", &[sets[0], sets[1], cells]).row().max_speed;
+    let (a, b) = (speed("accuracy.cells=16"), speed("accuracy.cells=32"));
+    println!("spurious speeds {a:e} {b:e}");
+    assert!(b < a, "{a:e} {b:e}");
+}
+
+#[test]
+fn every_step_balances_power_and_divergence() {
+    for (name, sets) in [
+        ("silo", &["accuracy.cells=4", "time.end=2e-4", "recording.times=[]"][..]),
+        ("silo_pencils", &["accuracy.cells=4", "time.end=1e-4"]),
+        ("rayleigh_taylor", &["accuracy.cells=12", "time.end=30"]),
+    ] {
+        let mut run = preset(name, sets);
+        finish(run.as_mut(), |run| {
+            let row = run.row();
+            assert!(row.power_error < 1e-8, "{name}: power {}", row.power_error);
+            assert!(row.divergence_error < 1e-11, "{name}: {}", row.divergence_error);
+            assert!(row.director_error < 1e-13);
+        });
+    }
+}
+
+#[test]
+fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
+    let mut run = preset("silo", &["accuracy.cells=6", "alpha=1/3", "time.end=1.4e-3", "recording.times=[]"]);
+    let first = run.row().potential_energy;
+    let mut from_rate = 0.0;
+    let mut before = (0.0, run.row().gauges[0].rate);
+    finish(run.as_mut(), |run| {
+        let row = run.row();
+        let now = (row.time, row.gauges[0].rate);
+        from_rate += 0.5 * (now.0 - before.0) * (now.1 + before.1);
+        before = now;
+        // Rows of particles cross mesh lines together: at most an eighth of a cell along the
+        // surface is uncertain while they do.
+        assert!(row.drift[0].abs() < 5e-3, "t = {}: drift {}", row.time, row.drift[0]);
+    });
+    assert!(run.row().drift[0].abs() < 2e-3, "drift {}", run.row().drift[0]);
+    let row = run.row();
+    let volume = row.gauges[0].volume;
+    println!("outflow {volume} from rate {from_rate}, energy {:e}", energy_error(run.as_ref(), first));
+    assert!((volume / from_rate - 1.0).abs() < 5e-3, "{volume} {from_rate}");
+    assert!(energy_error(run.as_ref(), first).abs() < 0.01);
+    // Particles stay inside, and their volumes add up to the grains'.
+    let plan = run.plan();
+    let total: f64 = run.particles().volumes(2)[0] * plan.units.area();
+    assert!((total / 16.0 - 1.0).abs() < 1e-12, "{total}");
+    for p in &run.particles().position {
+        let [x, y] = plan.si(*p);
+        assert!((-3.0..=3.0).contains(&x) && (0.0..=8.0).contains(&y));
+    }
+}
+
+#[test]
+fn a_symmetric_silo_stays_symmetric() {
+    let mut run = preset("silo", &["accuracy.cells=4", "time.end=3e-4", "recording.times=[]"]);
+    finish(run.as_mut(), |_| {});
+    let scale = run.row().max_speed;
+    for [x, y] in [[0.3, 2.6], [0.4, 3.4], [1.2, 4.0], [2.6, 5.0], [1.7, 6.5]] {
+        let (r, l) = (run.velocity_at([x, y]), run.velocity_at([-x, y]));
+        assert!((r[0] + l[0]).abs() < 1e-4 * scale, "{r:?} {l:?}");
+        assert!((r[1] - l[1]).abs() < 1e-4 * scale, "{r:?} {l:?}");
+    }
+}
+
+/// A drop with directors and Cosserat rotation falling beside a wall; `turned` by 90 degrees.
+fn drop(turned: bool) -> Box<dyn Run> {
+    let swap = |a: &str, b: &str| if turned { format!("[{b}, {a}]") } else { format!("[{a}, {b}]") };
+    // (x, y) -> (-y, x)
+    let (domain_x, domain_y) =
+        if turned { ("[-1.5, 0]", "[0, 1]") } else { ("[0, 1]", "[0, 1.5]") };
+    let gravity = if turned { "[10, 0]" } else { "[0, -10]" };
+    let centre = if turned { "[-1.0, 0.4]" } else { "[0.4, 1.0]" };
+    let angle = if turned { 120.0 } else { 30.0 };
+    let wall = if turned {
+        "from = [-0.5, 0.5]\nto = [-0.5, 1]"
+    } else {
+        "from = [0.5, 0.5]\nto = [1, 0.5]"
+    };
+    let _ = swap;
+    scene(
+        &format!(
+            "schema = 1\nname = \"drop\"\ngravity = {gravity}\n[domain]\nx = {domain_x}\ny = {domain_y}\n\
+             length_scale = 1\n[accuracy]\ncells = 8\n[time]\nend = 0.4\nmax_step = 0.02\n\
+             [materials.drop]\ndensity = 100\nshear_viscosity = 50\ncoupling_viscosity = 40\n\
+             internal_length = 0.2\nlayer_viscosity = 5\n\
+             [materials.rest]\nshear_viscosity = 1\nbackground = true\n\
+             [[regions]]\nmaterial = \"drop\"\nshape.circle = {{ centre = {centre}, radius = 0.26 }}\n\
+             director.angle_degrees = {angle}\n[[walls]]\nname = \"shelf\"\n{wall}\n"
+        ),
+        &[],
+    )
+}
+
+#[test]
+fn a_turned_scene_gives_the_turned_result() {
+    let (mut a, mut b) = (drop(false), drop(true));
+    for step in 0..12 {
+        let scale = a.row().max_speed;
+        for [x, y] in [[0.4, 1.0], [0.2, 0.6], [0.55, 1.2], [0.8, 0.7], [0.7, 0.2]] {
+            let (p, q) = (a.velocity_at([x, y]), b.velocity_at([-y, x]));
+            let turned = [-p[1], p[0], p[2]];
+            for c in 0..3 {
+                assert!((turned[c] - q[c]).abs() < 1e-6 * scale.max(1.0), "step {step}: {turned:?} {q:?}");
+            }
+        }
+        a.step().unwrap();
+        b.step().unwrap();
+    }
+}
+
+#[test]
+fn initial_discharge_converges_from_below_at_first_order() {
+    // Limit 0.805 rho g a^3 / eta from an independent program; uniform meshes.
+    let rate = |cells: &str| {
+        preset("silo", &["alpha=0", "mesh.grading=[]", cells]).row().gauges[0].rate / 1e4
+    };
+    let [a, b, c] = ["accuracy.cells=4", "accuracy.cells=8", "accuracy.cells=16"].map(rate);
+    println!("initial discharge {a} {b} {c}");
+    assert!(a < b && b < c && c < 0.805);
+    let order = ((b - a) / (c - b)).log2();
+    assert!(order > 0.8, "{order}");
+    // A graded mesh does better with its smaller corner cells.
+    let graded = preset("silo", &["alpha=0", "accuracy.cells=8"]).row().gauges[0].rate / 1e4;
+    assert!((0.805 - graded).abs() < 0.805 - b, "{graded} {b}");
+}
+
+#[test]
+fn discharge_orders_in_alpha_and_levels_off() {
+    let rate = |alpha: &str| {
+        preset("silo", &[alpha, "mesh.grading=[]", "accuracy.cells=8"]).row().gauges[0].rate
+    };
+    let r = ["alpha=0", "alpha=1/3", "alpha=2/3", "alpha=5/3", "alpha=10/3"].map(rate);
+    assert!(r.windows(2).all(|w| w[0] > w[1]), "{r:?}");
+    assert!(r[3] / r[4] - 1.0 < 0.015, "{r:?}");
+    assert!(r[1] / r[3] - 1.0 > 0.05, "{r:?}");
+}
