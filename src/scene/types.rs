@@ -213,7 +213,8 @@ pub enum Shape {
 pub enum Director {
     /// Angle of the layer normal to the x axis, degrees, in x and y.
     AngleDegrees(Field),
-    /// Uniform in all directions, stratified cell by cell, from `accuracy.seed`.
+    /// Uniform in all directions, spread evenly over neighbouring particles, from
+    /// `accuracy.seed`.
     Random,
 }
 

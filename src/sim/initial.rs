@@ -28,11 +28,13 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
         ..Particles::default()
     };
     let background = plan.background();
+    let start: f64 = plan.method.seeding.random(usize::MAX).random();
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let mut random = plan.method.seeding.random(cell);
         let places = plan.method.seeding.positions(mesh, cell, &mut random);
         let volume = mesh.cell_area(cell) / places.len() as f64;
-        let angles = stratified_angles(places.len(), &mut random);
+        let (i, j) = mesh.cell_ij(cell);
+        let angles = spread_angles(places.len(), [i, j], start, &mut random);
         for (p, angle) in places.into_iter().zip(angles) {
             let si = plan.si(p);
             let region = plan.regions.iter().rev().find(|r| r.shape.contains(si));
@@ -67,12 +69,16 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
     Ok(out)
 }
 
-/// Angles uniform in `[-pi/2, pi/2)`, one in each of `n` equal parts, in random order: the mean
-/// over a cell has far less noise than independent ones would give.
-fn stratified_angles(n: usize, random: &mut Pcg64) -> Vec<f64> {
+/// Angles spread evenly over `[-pi/2, pi/2)` in random order: `n` equal steps with an offset from
+/// a two-dimensional low-discrepancy sequence (Roberts 2018) over the cells, so that neighbouring
+/// cells fill each other's gaps. Each angle is uniformly distributed; means over few cells have
+/// far less noise than independent angles would give.
+fn spread_angles(n: usize, [i, j]: [usize; 2], start: f64, random: &mut Pcg64) -> Vec<f64> {
     use std::f64::consts::{FRAC_PI_2, PI};
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    let offset = (start + i as f64 / PLASTIC + j as f64 / (PLASTIC * PLASTIC)).fract();
     let mut angles: Vec<f64> =
-        (0..n).map(|k| -FRAC_PI_2 + PI * (k as f64 + random.random::<f64>()) / n as f64).collect();
+        (0..n).map(|k| -FRAC_PI_2 + PI * (k as f64 + offset) / n as f64).collect();
     for k in (1..n).rev() {
         angles.swap(k, random.random_range(0..=k));
     }

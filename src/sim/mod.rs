@@ -85,9 +85,6 @@ impl SimError {
     }
 }
 
-/// Sweeps of [`Balance`] per step.
-const BALANCE_SWEEPS: usize = 4;
-
 /// A run at one instant. `D` is 2, or 3 with Cosserat rotation; see [`start`] for the choice.
 pub struct Simulation<const D: usize> {
     plan: Arc<Plan>,
@@ -251,7 +248,7 @@ impl<const D: usize> Simulation<D> {
         self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
         if !plan.effects.volume_change {
             let gauges = &mut self.gauges;
-            self.balance.even_out(&plan.mesh, &mut self.particles, BALANCE_SWEEPS, |f, m, v| {
+            self.balance.even_out(&plan.mesh, &mut self.particles, |f, m, v| {
                 gauges.iter_mut().for_each(|g| g.exchange(f, m, v));
             });
         }

@@ -2,11 +2,11 @@
 //!
 //! Particles carried by a discrete velocity crowd here and thin out there; then the volume that a
 //! cell's particles stand for differs from the cell's, and a material's projected volume drifts
-//! (by several percent over a discharge). A few sweeps a step let volume pass between particles
+//! (by a percent over a discharge). A sweep a step lets volume pass between particles
 //! of one material in neighbouring cells, from the overfull to the underfull, like heat:
 //!
 //! ```text
-//! F_ab = k (e_a - e_b) min(A_a, A_b),   e = (sum of volumes)/A - 1,   k = 1/4
+//! F_ab = k (e_a - e_b) min(A_a, A_b),   e = (sum of volumes)/A - 1
 //! ```
 //! Volume is kept exactly, material by material; nothing passes through walls, and what passes
 //! a gauge is counted by it.
@@ -15,8 +15,12 @@ use super::mesh::Mesh;
 use super::particles::Particles;
 use super::walls::Enclosure;
 
-/// Conductance between neighbours; 1/4 is the largest stable value with four of them.
-const CONDUCTANCE: f64 = 0.25;
+/// Conductance between neighbours, for one sweep a step. The largest stable value is 1/4, but a
+/// strong sweep answers to rows of particles crossing mesh lines, and then carries volume ahead
+/// of the flow: on the silo at 6 cells per aperture, outflow counted against outflow by flux was
+/// off by 0.8 % with four sweeps at 1/4 and 0.2 % at 1/40; without any it was 0.7 %, and the
+/// projected volume had drifted by 0.9 % at the end (0.2 % at most with 1/40).
+const CONDUCTANCE: f64 = 0.025;
 /// Most of a material's volume that may leave a cell through one face in a sweep.
 const LARGEST_SHARE: f64 = 0.1;
 
@@ -69,8 +73,6 @@ pub struct Balance {
     /// Index `cell * materials + material`.
     now: Vec<f64>,
     before: Vec<f64>,
-    /// State before a sweep.
-    start: Vec<f64>,
     excess: Vec<f64>,
 }
 
@@ -82,18 +84,16 @@ impl Balance {
             materials,
             now: vec![0.0; size],
             before: vec![0.0; size],
-            start: vec![0.0; size],
             excess: vec![0.0; mesh.cells()],
         }
     }
 
-    /// Runs `sweeps` sweeps on sorted particles. `passed(face, material, volume)` hears of every
+    /// Runs a sweep on sorted particles. `passed(face, material, volume)` hears of every
     /// passage, positive along the normal.
     pub fn even_out(
         &mut self,
         mesh: &Mesh,
         particles: &mut Particles,
-        sweeps: usize,
         mut passed: impl FnMut(&Face, u8, f64),
     ) {
         let n = self.materials;
@@ -104,36 +104,33 @@ impl Balance {
             }
         }
         self.now.copy_from_slice(&self.before);
-        for _ in 0..sweeps {
-            for cell in 0..mesh.cells() {
-                let total: f64 = self.now[cell * n..][..n].iter().sum();
-                // A cell without particles is full of background, and takes no part.
-                let empty = particles.of_cell(cell).is_empty();
-                self.excess[cell] =
-                    if empty { f64::NAN } else { total / mesh.cell_area(cell) - 1.0 };
+        for cell in 0..mesh.cells() {
+            let total: f64 = self.before[cell * n..][..n].iter().sum();
+            // A cell without particles is full of background, and takes no part.
+            let empty = particles.of_cell(cell).is_empty();
+            self.excess[cell] =
+                if empty { f64::NAN } else { total / mesh.cell_area(cell) - 1.0 };
+        }
+        // All fluxes from the state before: no direction is favoured.
+        for face in &self.faces {
+            let [a, b] = face.cells.map(|c| c as usize);
+            let difference = self.excess[a] - self.excess[b];
+            if !(difference.abs() > SMALLEST_DIFFERENCE) {
+                continue;
             }
-            // All fluxes from the state before the sweep: no direction is favoured.
-            self.start.copy_from_slice(&self.now);
-            for face in &self.faces {
-                let [a, b] = face.cells.map(|c| c as usize);
-                let difference = self.excess[a] - self.excess[b];
-                if !(difference.abs() > SMALLEST_DIFFERENCE) {
-                    continue;
-                }
-                let (from, to, sign) = if difference > 0.0 { (a, b, 1.0) } else { (b, a, -1.0) };
-                let area = mesh.cell_area(a).min(mesh.cell_area(b));
-                let flux = CONDUCTANCE * difference.abs() * area;
-                let (here, there) = (&self.start[from * n..][..n], &self.start[to * n..][..n]);
-                // Volume can only pass to particles of its own kind.
-                let shared = |m: usize| if there[m] > 0.0 { here[m] } else { 0.0 };
-                let common: f64 = (0..n).map(shared).sum();
-                for m in (0..n).filter(|&m| shared(m) > 0.0) {
-                    let limit = LARGEST_SHARE * here[m].min(there[m]);
-                    let volume = (flux * here[m] / common).min(limit);
-                    self.now[from * n + m] -= volume;
-                    self.now[to * n + m] += volume;
-                    passed(face, m as u8, sign * volume);
-                }
+            let (from, to, sign) = if difference > 0.0 { (a, b, 1.0) } else { (b, a, -1.0) };
+            let area = mesh.cell_area(a).min(mesh.cell_area(b));
+            let flux = CONDUCTANCE * difference.abs() * area;
+            let (here, there) = (&self.before[from * n..][..n], &self.before[to * n..][..n]);
+            // Volume can only pass to particles of its own kind.
+            let shared = |m: usize| if there[m] > 0.0 { here[m] } else { 0.0 };
+            let common: f64 = (0..n).map(shared).sum();
+            for m in (0..n).filter(|&m| shared(m) > 0.0) {
+                let limit = LARGEST_SHARE * here[m].min(there[m]);
+                let volume = (flux * here[m] / common).min(limit);
+                self.now[from * n + m] -= volume;
+                self.now[to * n + m] += volume;
+                passed(face, m as u8, sign * volume);
             }
         }
         for cell in 0..mesh.cells() {
