@@ -98,10 +98,7 @@ pub struct Scalar {
 impl Scalar {
     /// A number and where it belongs.
     pub fn new(path: impl Into<String>, value: f64) -> Self {
-        Self {
-            path: path.into(),
-            value,
-        }
+        Self { path: path.into(), value }
     }
 }
 
@@ -213,9 +210,6 @@ pub struct Series {
 impl Series {
     /// A curve of the numbers at `path`.
     pub fn new(path: impl Into<String>, name: impl Into<String>) -> Self {
-        Self {
-            path: path.into(),
-            name: name.into(),
-        }
+        Self { path: path.into(), name: name.into() }
     }
 }

@@ -53,8 +53,8 @@ pub fn couette(fluid: Fluid, tau: f64) -> Case {
         ),
         exact: Exact {
             velocity: Box::new(move |_, y| {
-                let u = tau / eta
-                    * (y - eta_c * (k * y).sinh() / ((eta + eta_c) * k * (k * h).cosh()));
+                let u =
+                    tau / eta * (y - eta_c * (k * y).sinh() / ((eta + eta_c) * k * (k * h).cosh()));
                 [u, 0.0, -tau / (2.0 * eta) * (1.0 - (k * y).cosh() / (k * h).cosh())]
             }),
             pressure: Box::new(|_, _| 0.0),

@@ -20,8 +20,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (_, plan) = super::resolve(&source)?;
     let list = plan.describe();
     if args.json {
-        let text = serde_json::to_string_pretty(&list)
-            .map_err(|e| Failure::Environment(e.to_string()))?;
+        let text =
+            serde_json::to_string_pretty(&list).map_err(|e| Failure::Environment(e.to_string()))?;
         print(&text)
     } else {
         print(&plan_text(&list))

@@ -159,7 +159,8 @@ impl Session {
         let scene_file = folder.join("scene.toml");
         std::fs::write(&scene_file, to_toml(&plan.scene)).map_err(|e| cannot(&scene_file, e))?;
         let series_file = folder.join("series.csv");
-        let series = SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
+        let series =
+            SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
         let recording = (!args.no_recording)
             .then(|| args.save.clone().unwrap_or_else(|| folder.join("recording.rrd")));
         let mut sinks: Vec<Sink> = recording.iter().cloned().map(Sink::Save).collect();
@@ -168,7 +169,8 @@ impl Session {
         }
         sinks.extend(args.connect.clone().map(Sink::Connect));
         sinks.extend(args.spawn.then_some(Sink::Spawn));
-        let name = folder.file_name().map_or(plan.scene.name.clone(), |n| n.to_string_lossy().into());
+        let name =
+            folder.file_name().map_or(plan.scene.name.clone(), |n| n.to_string_lossy().into());
         let mut warnings: Vec<String> = plan.warnings.iter().map(ToString::to_string).collect();
         let every = picture::thinning(plan, picture::drawn(plan, run.particles()).len());
         if every > 1 && !sinks.is_empty() {
@@ -184,7 +186,8 @@ impl Session {
             if let Some(url) = log.url() {
                 eprintln!("viewer: {url}");
             }
-            let policy = if recording.is_some() { Backpressure::Wait } else { Backpressure::DropOldest };
+            let policy =
+                if recording.is_some() { Backpressure::Wait } else { Backpressure::DropOldest };
             Some(Logger::start(log, policy).map_err(|e| {
                 Failure::Environment(format!("the logger thread cannot be started: {e}"))
             })?)
@@ -233,8 +236,11 @@ impl Session {
             .map_err(|e| {
                 Failure::Environment(format!("the simulation thread cannot be started: {e}"))
             })?;
-        let bar = ProgressBar::with_draw_target(Some(10_000), ProgressDrawTarget::stderr_with_hz(8));
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}  {elapsed} of about {duration}") {
+        let bar =
+            ProgressBar::with_draw_target(Some(10_000), ProgressDrawTarget::stderr_with_hz(8));
+        if let Ok(style) = ProgressStyle::with_template(
+            "{bar:30} {percent:>3} %  {msg}  {elapsed} of about {duration}",
+        ) {
             bar.set_style(style);
         }
         for (step, time) in receiver {
@@ -377,31 +383,37 @@ impl Session {
             let of = |value: &dyn Fn(&Row, usize) -> f64| -> Vec<Curve> {
                 (0..gauges.len()).map(|k| curve(&gauges[k].name, &|r| value(r, k))).collect()
             };
-            panels_plot(&self.folder.join("outflow"), &[
-                PlotSpec {
-                    title: format!("{title}: volume that has flowed out"),
-                    x: time(),
-                    y: Axis::new("outflow volume", "m²"),
-                    curves: of(&|r, k| r.gauges[k].volume),
-                },
-                PlotSpec {
-                    title: "rate of outflow".into(),
-                    x: time(),
-                    y: Axis::new("outflow rate", "m²/s"),
-                    curves: of(&|r, k| r.gauges[k].rate),
-                },
-            ])?;
+            panels_plot(
+                &self.folder.join("outflow"),
+                &[
+                    PlotSpec {
+                        title: format!("{title}: volume that has flowed out"),
+                        x: time(),
+                        y: Axis::new("outflow volume", "m²"),
+                        curves: of(&|r, k| r.gauges[k].volume),
+                    },
+                    PlotSpec {
+                        title: "rate of outflow".into(),
+                        x: time(),
+                        y: Axis::new("outflow rate", "m²/s"),
+                        curves: of(&|r, k| r.gauges[k].rate),
+                    },
+                ],
+            )?;
         }
-        line_plot(&self.folder.join("diagnostics"), &PlotSpec {
-            title: format!("{title}: balances"),
-            x: time(),
-            y: Axis::new("relative error", "").log(),
-            curves: vec![
-                curve("power", &|r| r.power_error),
-                curve("divergence", &|r| r.divergence_error),
-                curve("volume", &|r| r.volume_error),
-            ],
-        })?;
+        line_plot(
+            &self.folder.join("diagnostics"),
+            &PlotSpec {
+                title: format!("{title}: balances"),
+                x: time(),
+                y: Axis::new("relative error", "").log(),
+                curves: vec![
+                    curve("power", &|r| r.power_error),
+                    curve("divergence", &|r| r.divergence_error),
+                    curve("volume", &|r| r.volume_error),
+                ],
+            },
+        )?;
         Ok(())
     }
 
@@ -421,7 +433,8 @@ impl Session {
             duration(self.tally.wall)
         );
         for (name, g) in &s.gauges {
-            out += &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
+            out +=
+                &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
         }
         let drift = s.volume_drift.values().map(|d| d.abs()).fold(0.0, f64::max);
         out += &format!(
@@ -432,7 +445,10 @@ impl Session {
         );
         if self.profile {
             for (name, seconds) in &s.seconds {
-                out += &format!("  {name:<20} {seconds:>9.3} s {:>5.1} %\n", 100.0 * seconds / self.tally.wall);
+                out += &format!(
+                    "  {name:<20} {seconds:>9.3} s {:>5.1} %\n",
+                    100.0 * seconds / self.tally.wall
+                );
             }
         }
         out += &format!("  folder: {}\n", self.folder.display());

@@ -74,13 +74,11 @@ impl Counter {
         let (across, along) = if g.normal == 0 { (&mesh.x, &mesh.y) } else { (&mesh.y, &mesh.x) };
         let line = across.nearest_line(g.at);
         let (first, last) = (along.nearest_line(g.from), along.nearest_line(g.to));
-        let below = if line > 0 {
-            Some(line - 1)
-        } else {
-            across.periodic().then(|| across.cells() - 1)
-        };
+        let below =
+            if line > 0 { Some(line - 1) } else { across.periodic().then(|| across.cells() - 1) };
         let above = (line < across.cells()).then_some(line);
-        let cell_at = |m: usize, k: usize| if g.normal == 0 { mesh.cell(m, k) } else { mesh.cell(k, m) };
+        let cell_at =
+            |m: usize, k: usize| if g.normal == 0 { mesh.cell(m, k) } else { mesh.cell(k, m) };
         let mut flux = 0.0;
         for k in first..last {
             let [low, high] = [below, above].map(|m| m.map(|m| cell_at(m, k)));

@@ -121,12 +121,7 @@ impl BoundaryPlan {
     }
 
     /// Adds the nodal forces of given tractions.
-    pub fn add_tractions<const D: usize>(
-        &self,
-        mesh: &Mesh,
-        units: &Units,
-        load: &mut [[f64; D]],
-    ) {
+    pub fn add_tractions<const D: usize>(&self, mesh: &Mesh, units: &Units, load: &mut [[f64; D]]) {
         for (s, side) in self.sides.iter().enumerate() {
             let normal = side_normal(s);
             let edge = if s % 2 == 0 { -1.0 } else { 1.0 };

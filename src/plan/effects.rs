@@ -78,16 +78,23 @@ impl Plan {
     fn list_effects(&self) -> Vec<Effect> {
         let materials = &self.state.materials;
         let names = |f: &dyn Fn(&super::Material) -> bool| -> String {
-            let list: Vec<_> =
-                materials.iter().filter(|m| f(m)).map(|m| m.name.as_str()).collect();
+            let list: Vec<_> = materials.iter().filter(|m| f(m)).map(|m| m.name.as_str()).collect();
             list.join(", ")
         };
         let e = &self.effects;
         let nodes = self.mesh.nodes();
         let mut list = Vec::new();
         let mut add = |name, solved, why: String, unknowns, particle_bytes, stages: &[_]| {
-            let (unknowns, particle_bytes) = if solved { (unknowns, particle_bytes) } else { (0, 0) };
-            list.push(Effect { name, solved, why, unknowns, particle_bytes, stages: stages.to_vec() });
+            let (unknowns, particle_bytes) =
+                if solved { (unknowns, particle_bytes) } else { (0, 0) };
+            list.push(Effect {
+                name,
+                solved,
+                why,
+                unknowns,
+                particle_bytes,
+                stages: stages.to_vec(),
+            });
         };
         let why = |on: bool, yes: String, no: &str| if on { yes } else { no.to_string() };
         add(
@@ -103,7 +110,10 @@ impl Plan {
             e.rotation,
             why(
                 e.rotation,
-                format!("coupling viscosity and internal length: {}", names(&|m| m.rotation.is_some())),
+                format!(
+                    "coupling viscosity and internal length: {}",
+                    names(&|m| m.rotation.is_some())
+                ),
                 "no material has both a coupling viscosity and an internal length above zero",
             ),
             nodes,
@@ -145,7 +155,11 @@ impl Plan {
         add(
             "carried viscosity",
             e.carried_viscosity,
-            why(e.carried_viscosity, names(&|m| m.carries_viscosity), "every viscosity is constant"),
+            why(
+                e.carried_viscosity,
+                names(&|m| m.carries_viscosity),
+                "every viscosity is constant",
+            ),
             0,
             8,
             &[],
@@ -189,7 +203,11 @@ impl Plan {
         add(
             "local harmonic mixture",
             !plain,
-            why(!plain, "accuracy.quadrature = \"mixture\"".into(), "accuracy.quadrature = \"particles\""),
+            why(
+                !plain,
+                "accuracy.quadrature = \"mixture\"".into(),
+                "accuracy.quadrature = \"particles\"",
+            ),
             0,
             0,
             &[],

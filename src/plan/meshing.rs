@@ -81,7 +81,11 @@ impl Sizing {
 
     /// `integral dx / size`
     fn cells_between(&self, a: f64, b: f64) -> f64 {
-        if self.is_uniform_between(a, b) { (b - a) / self.size } else { self.cumulative(a, b)[SAMPLES] }
+        if self.is_uniform_between(a, b) {
+            (b - a) / self.size
+        } else {
+            self.cumulative(a, b)[SAMPLES]
+        }
     }
 
     fn cumulative(&self, a: f64, b: f64) -> Vec<f64> {

@@ -76,12 +76,8 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
                 "order [[schedule]] by time",
             ));
         }
-        let label = change
-            .set
-            .iter()
-            .map(|(k, v)| format!("{k} = {v}"))
-            .collect::<Vec<_>>()
-            .join(", ");
+        let label =
+            change.set.iter().map(|(k, v)| format!("{k} = {v}")).collect::<Vec<_>>().join(", ");
         plan.changes.push(PlannedChange { when, state, label });
     }
     for change in &plan.changes {
@@ -499,7 +495,8 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
         carried_viscosity: si.materials.iter().any(|m| m.viscosity_field.is_some()),
         carried_density: si.materials.iter().any(|m| m.density_field.is_some()),
         volume_change: si.materials.iter().any(|m| m.compliance > 0.0),
-        gravity: si.gravity != [0.0; 2] && si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some()),
+        gravity: si.gravity != [0.0; 2]
+            && si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some()),
     };
     if !effects.rotation {
         for (name, side) in SIDES.iter().zip(&boundary.sides) {
@@ -517,14 +514,23 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
     let body_force = scene
         .body_force
         .as_ref()
-        .map(|f| Ok::<_, SceneError>([f.x.compile(scope)?, f.y.compile(scope)?, f.couple.compile(scope)?]))
+        .map(|f| {
+            Ok::<_, SceneError>([
+                f.x.compile(scope)?,
+                f.y.compile(scope)?,
+                f.couple.compile(scope)?,
+            ])
+        })
         .transpose()?;
     check_null_spaces(scene, &boundary, &mesh, &units, &effects, body_force.as_ref())?;
 
     let initial = si
         .materials
         .iter()
-        .map(|m| InitialFields { viscosity: m.viscosity_field.clone(), density: m.density_field.clone() })
+        .map(|m| InitialFields {
+            viscosity: m.viscosity_field.clone(),
+            density: m.density_field.clone(),
+        })
         .collect();
     let gauges = gauges.into_iter().map(|g| g.scaled(&mesh, &units)).collect();
     let (tracers, marks) = dye(scene, scope, length, &units)?;
@@ -612,9 +618,19 @@ impl Walls {
         let mut walls = Vec::new();
         for w in &scene.walls {
             let rotation = w.rotation.as_ref().map(|q| q.eval(scope)).transpose();
-            match (axis_segment(&format!("wall `{}`", w.name), &w.from, &w.to, scope, domain), rotation) {
+            match (
+                axis_segment(&format!("wall `{}`", w.name), &w.from, &w.to, scope, domain),
+                rotation,
+            ) {
                 (Ok((normal, at, along)), Ok(rotation)) => {
-                    walls.push(SiWall { name: w.name.clone(), normal, at, along, kind: w.kind, rotation });
+                    walls.push(SiWall {
+                        name: w.name.clone(),
+                        normal,
+                        at,
+                        along,
+                        kind: w.kind,
+                        rotation,
+                    });
                 }
                 (Err(e), _) | (_, Err(e)) => errors.push(e),
             }
@@ -755,10 +771,20 @@ fn gauges(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Vec<SiG
             ));
         }
         if list.iter().any(|o| o.name == g.name) {
-            return Err(SceneError::new(format!("two gauges are named `{}`", g.name), "rename one"));
+            return Err(SceneError::new(
+                format!("two gauges are named `{}`", g.name),
+                "rename one",
+            ));
         }
         let material = material_index(&scene.materials, &g.material, &what)?;
-        list.push(SiGauge { name: g.name.clone(), normal, at, along, direction: g.direction, material });
+        list.push(SiGauge {
+            name: g.name.clone(),
+            normal,
+            at,
+            along,
+            direction: g.direction,
+            material,
+        });
     }
     Ok(list)
 }
@@ -773,7 +799,10 @@ fn mesh(
     units: &Units,
 ) -> Result<Mesh> {
     if scene.accuracy.cells == 0 {
-        return Err(SceneError::new("accuracy.cells is 0", "give 1 or more cells per length_scale"));
+        return Err(SceneError::new(
+            "accuracy.cells is 0",
+            "give 1 or more cells per length_scale",
+        ));
     }
     let size = length / f64::from(scene.accuracy.cells);
     let growth = scene.mesh.growth;
@@ -871,9 +900,8 @@ fn mesh(
     let mut mesh = Mesh::new(x, y);
     for cell in 0..mesh.cells() {
         let [px, py] = mesh.cell_centre(cell).map(|v| v * units.length);
-        mesh.solid[cell] = walls.blocks.iter().any(|([x, y], _)| {
-            px > x[0] && px < x[1] && py > y[0] && py < y[1]
-        });
+        mesh.solid[cell] =
+            walls.blocks.iter().any(|([x, y], _)| px > x[0] && px < x[1] && py > y[0] && py < y[1]);
     }
     if mesh.solid.iter().all(|&s| s) {
         return Err(SceneError::new("blocks fill the whole domain", "leave room for a material"));
@@ -1039,7 +1067,10 @@ fn boundary(
     let free_translation = [!held(0), !held(1)];
     let compressible = state.materials.iter().any(|m| m.compliance > 0.0);
     let closed = !compressible
-        && sides.iter().enumerate().all(|(s, b)| b.periodic || b.velocity[side_normal(s)].is_some());
+        && sides
+            .iter()
+            .enumerate()
+            .all(|(s, b)| b.periodic || b.velocity[side_normal(s)].is_some());
     let plan = BoundaryPlan { sides, walls: lines, free_translation, closed };
     if closed {
         let (net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
@@ -1085,7 +1116,8 @@ fn check_null_spaces(
         let name = ["x", "y"][c];
         let total: f64 = load.iter().map(|f| f[c].abs()).sum();
         let net: f64 = load.iter().map(|f| f[c]).sum();
-        let gravity = if effects.gravity { scene.gravity[c].clone() } else { Quantity::number(0.0) };
+        let gravity =
+            if effects.gravity { scene.gravity[c].clone() } else { Quantity::number(0.0) };
         let pulled = effects.gravity && gravity.eval(&Scope::new(scene)?)? != 0.0;
         if pulled || net.abs() > 1e-9 * total {
             return Err(SceneError::at(
@@ -1235,7 +1267,10 @@ fn dye(
     for line in &dye.lines {
         let points = line.iter().map(|p| pair(p, scope)).collect::<Result<Vec<_>>>()?;
         if points.len() < 2 {
-            return Err(SceneError::new("a dye line has fewer than two points", "give two or more"));
+            return Err(SceneError::new(
+                "a dye line has fewer than two points",
+                "give two or more",
+            ));
         }
         add(&points);
     }
@@ -1269,7 +1304,10 @@ fn method(scene: &Scene) -> Result<Method> {
         ));
     }
     if a.max_corrections == 0 {
-        return Err(SceneError::new("accuracy.max_corrections is 0", "give 1 or more; 40 is usual"));
+        return Err(SceneError::new(
+            "accuracy.max_corrections is 0",
+            "give 1 or more; 40 is usual",
+        ));
     }
     Ok(Method {
         seeding: Seeding { side, placement: a.placement, seed: a.seed },
@@ -1283,8 +1321,7 @@ fn method(scene: &Scene) -> Result<Method> {
 fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<ClockPlan> {
     let t = &scene.time;
     let end = positive(&t.end, scope, "time.end")?;
-    let max_step =
-        t.max_step.as_ref().map(|q| positive(q, scope, "time.max_step")).transpose()?;
+    let max_step = t.max_step.as_ref().map(|q| positive(q, scope, "time.max_step")).transpose()?;
     if !(t.courant > 0.0 && t.courant <= 50.0) {
         return Err(SceneError::new(
             format!("time.courant is {}", t.courant),

@@ -55,10 +55,9 @@ impl fmt::Display for Warning {
                 "directors are given for `{material}`, whose layers make no difference: ignored; \
                  give it a layer_viscosity other than its shear_viscosity"
             ),
-            Warning::MaterialUnused { material } => write!(
-                f,
-                "material `{material}` fills no region; add one, or remove the material"
-            ),
+            Warning::MaterialUnused { material } => {
+                write!(f, "material `{material}` fills no region; add one, or remove the material")
+            }
             Warning::ParticlesThinned { every } => write!(
                 f,
                 "every {every}th particle is recorded; raise recording.max_particles for more"

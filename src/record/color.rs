@@ -96,17 +96,9 @@ impl ColorScale {
         let [low, high] = range.map(finite);
         if signed {
             let reach = low.abs().max(high.abs());
-            Self {
-                low: -reach,
-                high: reach,
-                signed,
-            }
+            Self { low: -reach, high: reach, signed }
         } else {
-            Self {
-                low: low.min(high),
-                high: low.max(high),
-                signed,
-            }
+            Self { low: low.min(high), high: low.max(high), signed }
         }
     }
 
@@ -133,11 +125,8 @@ impl ColorScale {
         } else {
             0.0
         };
-        let [r, g, b] = if self.signed {
-            lookup(&BLUE_WHITE_RUST, place)
-        } else {
-            lookup(&VIRIDIS, place)
-        };
+        let [r, g, b] =
+            if self.signed { lookup(&BLUE_WHITE_RUST, place) } else { lookup(&VIRIDIS, place) };
         [r, g, b, 255]
     }
 

@@ -1,6 +1,8 @@
 //! What a recording says of a run as a whole, and the scalars of each step.
 
-use crate::frame::{Frame, Material, Outline, Picture, Plot, Quantity, Rect, RunInfo, Scalar, Series};
+use crate::frame::{
+    Frame, Material, Outline, Picture, Plot, Quantity, Rect, RunInfo, Scalar, Series,
+};
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName, scene_hash, to_toml};
 use crate::sim::row::Row;
@@ -35,10 +37,13 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         .iter()
         .map(|w| w.name.clone())
         .chain(plan.scene.blocks.iter().flat_map(|b| vec![b.name.clone(); 4]));
-    walls.extend(plan.enclosure.obstacles.iter().zip(names).map(|(o, name)| Outline {
-        name,
-        points: segment(o.normal, o.at, o.from, o.to),
-    }));
+    walls.extend(
+        plan.enclosure
+            .obstacles
+            .iter()
+            .zip(names)
+            .map(|(o, name)| Outline { name, points: segment(o.normal, o.at, o.from, o.to) }),
+    );
     let mut materials: Vec<Material> = plan
         .state
         .materials
@@ -63,17 +68,15 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         gauges: plan
             .gauges
             .iter()
-            .map(|g| Outline { name: g.name.clone(), points: segment(g.normal, g.at, g.from, g.to) })
+            .map(|g| Outline {
+                name: g.name.clone(),
+                points: segment(g.normal, g.at, g.from, g.to),
+            })
             .collect(),
         materials,
         particle_radius: f(0.5 * sizes(x).min(sizes(y)) / side),
         particle_quantity: particle_quantity(plan.picture.colour_by),
-        fields: plan
-            .picture
-            .fields
-            .iter()
-            .filter_map(|&name| field_quantity(plan, name))
-            .collect(),
+        fields: plan.picture.fields.iter().filter_map(|&name| field_quantity(plan, name)).collect(),
         plots: plots(plan),
         scene_toml: to_toml(&plan.scene),
         plan_markdown: super::text::plan_markdown(&plan.describe()),
@@ -128,28 +131,47 @@ fn plots(plan: &Plan) -> Vec<Plot> {
         ));
     }
     if plan.gauges.is_empty() {
-        list.push(plot("Power (W/m)", false, vec![
-            Series::new("diagnostics/power_in", "loads"),
-            Series::new("diagnostics/dissipation", "dissipation"),
-        ]));
+        list.push(plot(
+            "Power (W/m)",
+            false,
+            vec![
+                Series::new("diagnostics/power_in", "loads"),
+                Series::new("diagnostics/dissipation", "dissipation"),
+            ],
+        ));
     }
-    list.push(plot("Balances (log10)", true, vec![
-        Series::new("diagnostics/power_error", "power error"),
-        Series::new("diagnostics/divergence_error", "divergence error"),
-        Series::new("diagnostics/volume_error", "volume error"),
-    ]));
-    list.push(plot("Seconds per step", false, vec![
-        Series::new("seconds/assemble", "assemble"),
-        Series::new("seconds/factor", "factor"),
-        Series::new("seconds/solve", "solve"),
-        Series::new("seconds/motion", "motion"),
-    ]));
+    list.push(plot(
+        "Balances (log10)",
+        true,
+        vec![
+            Series::new("diagnostics/power_error", "power error"),
+            Series::new("diagnostics/divergence_error", "divergence error"),
+            Series::new("diagnostics/volume_error", "volume error"),
+        ],
+    ));
+    list.push(plot(
+        "Seconds per step",
+        false,
+        vec![
+            Series::new("seconds/assemble", "assemble"),
+            Series::new("seconds/factor", "factor"),
+            Series::new("seconds/solve", "solve"),
+            Series::new("seconds/motion", "motion"),
+        ],
+    ));
     list.push(plot("Time step (log10 s)", true, vec![Series::new("time/dt", "dt")]));
     list
 }
 
 /// A frame of a row, with a picture on the steps that show one.
-pub fn frame(plan: &Plan, row: &Row, wall_s: f64, alignment: Option<f64>, picture: Option<Picture>, warnings: Vec<String>) -> Frame {
+pub fn frame(
+    plan: &Plan,
+    row: &Row,
+    wall_s: f64,
+    alignment: Option<f64>,
+    picture: Option<Picture>,
+    warnings: Vec<String>,
+) -> Frame {
     let mut scalars = vec![
         Scalar::new("diagnostics/power_in", row.power_in),
         Scalar::new("diagnostics/dissipation", row.dissipation),

@@ -33,11 +33,7 @@ pub fn short(value: f64) -> String {
 
 /// Drops zeros after the decimal point, and the point if nothing is left.
 pub fn trim_zeros(number: &str) -> &str {
-    if number.contains('.') {
-        number.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        number
-    }
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
 #[cfg(test)]

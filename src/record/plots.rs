@@ -50,11 +50,7 @@ pub struct Axis {
 impl Axis {
     /// A linear axis.
     pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-            log: false,
-        }
+        Self { name: name.into(), unit: unit.into(), log: false }
     }
 
     /// The same axis, logarithmic.
@@ -126,10 +122,7 @@ fn to_svg(path: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), Strin
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
-        let pen = Pen {
-            scale: f64::from(SVG_GRAIN),
-            joins: true,
-        };
+        let pen = Pen { scale: f64::from(SVG_GRAIN), joins: true };
         figure(&root, plots, pen).map_err(|e| e.to_string())?;
         root.present().map_err(|e| e.to_string())?;
     }
@@ -148,10 +141,7 @@ fn to_png(path: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), Strin
     let mut pixels = vec![0; 3 * large.0 as usize * large.1 as usize];
     {
         let root = BitMapBackend::with_buffer(&mut pixels, large).into_drawing_area();
-        let pen = Pen {
-            scale: f64::from(OVERSAMPLING),
-            joins: false,
-        };
+        let pen = Pen { scale: f64::from(OVERSAMPLING), joins: false };
         figure(&root, plots, pen).map_err(|e| e.to_string())?;
         root.present().map_err(|e| e.to_string())?;
     }
@@ -194,9 +184,7 @@ fn font() -> Result<(), String> {
         let file = epaint_default_fonts::UBUNTU_LIGHT;
         plotters::style::register_font(FONT, FontStyle::Normal, file).is_ok()
     });
-    known
-        .then_some(())
-        .ok_or_else(|| "the built-in font is broken".to_owned())
+    known.then_some(()).ok_or_else(|| "the built-in font is broken".to_owned())
 }
 
 /// How a backend draws.
@@ -264,11 +252,7 @@ impl Scale {
         let last = (high / step).floor() as i64;
         // Numbers such as 0.2 or 1500 are read as they are; others are not.
         let reach = low.abs().max(high.abs());
-        let exponent = if (0.1..1e4).contains(&reach) {
-            0
-        } else {
-            engineering_exponent(reach)
-        };
+        let exponent = if (0.1..1e4).contains(&reach) { 0 } else { engineering_exponent(reach) };
         let factor = 10f64.powi(exponent);
         let decimals = (-(step / factor).log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
         let ticks = (first..=last)
@@ -278,13 +262,7 @@ impl Scale {
                 (value, text.replace('-', "−"))
             })
             .collect();
-        Self {
-            low,
-            high,
-            log: false,
-            ticks,
-            label: axis_label(axis, exponent),
-        }
+        Self { low, high, log: false, ticks, label: axis_label(axis, exponent) }
     }
 
     fn logarithmic(axis: &Axis, low: f64, high: f64) -> Self {
@@ -296,15 +274,10 @@ impl Scale {
             let step = (span / 8.0).ceil().max(1.0) as i64;
             let first = (low / step as f64).ceil() as i64;
             let last = (high / step as f64).floor() as i64;
-            (first..=last)
-                .map(|i| ((i * step) as f64, decade(i * step)))
-                .collect()
+            (first..=last).map(|i| ((i * step) as f64, decade(i * step))).collect()
         } else {
-            let digits: &[f64] = if span > 1.0 {
-                &[1.0, 2.0, 5.0]
-            } else {
-                &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]
-            };
+            let digits: &[f64] =
+                if span > 1.0 { &[1.0, 2.0, 5.0] } else { &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0] };
             let (first, last) = (low.floor() as i64, high.floor() as i64);
             (first..=last)
                 .flat_map(|e| digits.iter().map(move |d| (d.log10() + e as f64, *d, e)))
@@ -312,13 +285,7 @@ impl Scale {
                 .map(|(place, digit, e)| (place, plain(digit, e)))
                 .collect()
         };
-        Self {
-            low,
-            high,
-            log: true,
-            ticks,
-            label: axis_label(axis, 0),
-        }
+        Self { low, high, log: true, ticks, label: axis_label(axis, 0) }
     }
 
     /// Moves the ends out by a share of the span.
@@ -419,12 +386,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
             i32::try_from(width).unwrap_or(i32::MAX) - px(35.0),
             i32::try_from(height).unwrap_or(i32::MAX) - px(68.0),
         ];
-        Self {
-            area,
-            plot,
-            pen,
-            frame,
-        }
+        Self { area, plot, pen, frame }
     }
 
     fn px(&self, n: f64) -> i32 {
@@ -471,15 +433,8 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
             let at = (middle, (top + bottom) / 2);
             self.text("no data", 22.0, at, centre)?;
         }
-        let frame = [
-            (left, top),
-            (right, top),
-            (right, bottom),
-            (left, bottom),
-            (left, top),
-        ];
-        self.area
-            .draw(&PathElement::new(frame, self.line(INK, 1.0)))
+        let frame = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
+        self.area.draw(&PathElement::new(frame, self.line(INK, 1.0)))
     }
 
     fn axes(&self, x: &Scale, y: &Scale) -> Drawn<B> {
@@ -491,8 +446,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
                 continue;
             }
             let line = [(at, top), (at, bottom)];
-            self.area
-                .draw(&PathElement::new(line, self.line(GRID, 1.0)))?;
+            self.area.draw(&PathElement::new(line, self.line(GRID, 1.0)))?;
             let below = (at, bottom + self.px(8.0));
             self.text(text, 17.0, below, Pos::new(HPos::Center, VPos::Top))?;
         }
@@ -502,8 +456,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
                 continue;
             }
             let line = [(left, at), (right, at)];
-            self.area
-                .draw(&PathElement::new(line, self.line(GRID, 1.0)))?;
+            self.area.draw(&PathElement::new(line, self.line(GRID, 1.0)))?;
             let beside = (left - self.px(9.0), at);
             self.text(text, 17.0, beside, Pos::new(HPos::Right, VPos::Center))?;
         }
@@ -531,10 +484,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         });
         let widths: Vec<i32> = widths.collect();
         let (swatch, gap, space) = (self.px(28.0), self.px(8.0), self.px(26.0));
-        let full: i32 = widths
-            .iter()
-            .map(|width| width + swatch + gap + space)
-            .sum();
+        let full: i32 = widths.iter().map(|width| width + swatch + gap + space).sum();
         let mut at = ((left + right - full + space) / 2).max(left);
         let y = self.px(64.0);
         let curves = self.plot.curves.iter().zip(&widths);
@@ -559,25 +509,17 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         let (width, height) = (f64::from(right - left), f64::from(bottom - top));
         let place = |&(px, py): &(f64, f64)| {
             let (u, v) = (x.place(px)?, y.place(py)?);
-            Some((
-                left + (u * width).round() as i32,
-                bottom - (v * height).round() as i32,
-            ))
+            Some((left + (u * width).round() as i32, bottom - (v * height).round() as i32))
         };
         let color = RGBColor(r, g, b);
         let places: Vec<Option<(i32, i32)>> = curve.points.iter().map(place).collect();
         for piece in places.split(Option::is_none) {
             let piece: Vec<(i32, i32)> = piece.iter().flatten().copied().collect();
-            let piece = if piece.len() > MOST_POINTS {
-                extremes(&piece)
-            } else {
-                piece
-            };
+            let piece = if piece.len() > MOST_POINTS { extremes(&piece) } else { piece };
             // A single point has no line, and would vanish.
             if curve.marks || piece.len() == 1 {
                 for &at in &piece {
-                    self.area
-                        .draw(&Circle::new(at, self.px(4.5), color.filled()))?;
+                    self.area.draw(&Circle::new(at, self.px(4.5), color.filled()))?;
                 }
             }
             let style = self.line(color, 2.0);
@@ -642,15 +584,8 @@ mod tests {
         ];
         for (i, points) in curves.iter().enumerate() {
             for log in [false, true] {
-                let axis = Axis {
-                    log,
-                    ..Axis::new("a", "s")
-                };
-                let curve = Curve {
-                    name: "c".to_owned(),
-                    points: points.to_vec(),
-                    marks: false,
-                };
+                let axis = Axis { log, ..Axis::new("a", "s") };
+                let curve = Curve { name: "c".to_owned(), points: points.to_vec(), marks: false };
                 let plot = PlotSpec {
                     title: String::new(),
                     x: axis.clone(),

@@ -141,11 +141,7 @@ impl Paths {
     }
 
     fn curve(&self, path: &str, log10: bool) -> EntityPath {
-        if log10 {
-            self.at(&format!("{path}/log10"))
-        } else {
-            self.at(path)
-        }
+        if log10 { self.at(&format!("{path}/log10")) } else { self.at(path) }
     }
 }
 
@@ -298,10 +294,7 @@ impl RerunLog {
             saved,
             pictures: self.pictures,
             notices: self.notices,
-            served: self.page.map(|page| Served {
-                _rec: self.rec,
-                page,
-            }),
+            served: self.page.map(|page| Served { _rec: self.rec, page }),
         })
     }
 
@@ -338,10 +331,8 @@ impl RerunLog {
     /// Walls, gauges, legends, and the transform that turns y up.
     fn world(&mut self, info: &RunInfo) -> Result<(), RecordError> {
         let world = self.paths.at("world");
-        self.rec.log_static(
-            world.clone(),
-            &archetypes::Transform3D::from_scale([1.0, -1.0, 1.0]),
-        )?;
+        self.rec
+            .log_static(world.clone(), &archetypes::Transform3D::from_scale([1.0, -1.0, 1.0]))?;
         let classes = info.materials.iter().enumerate().map(|(i, material)| {
             let id = u16::try_from(i).unwrap_or(u16::MAX);
             (id, material.name.as_str(), rgb8(material.rgb))
@@ -424,10 +415,8 @@ impl RerunLog {
         }
         let scene = format!("{fence}toml\n{}\n{fence}\n", info.scene_toml.trim_end());
         for (path, text) in [("scene", scene), ("plan", info.plan_markdown.clone())] {
-            self.rec.log_static(
-                self.paths.at(path),
-                &archetypes::TextDocument::from_markdown(text),
-            )?;
+            self.rec
+                .log_static(self.paths.at(path), &archetypes::TextDocument::from_markdown(text))?;
         }
         Ok(())
     }
@@ -436,11 +425,8 @@ impl RerunLog {
     fn curves(&self, info: &RunInfo) -> Result<(), RecordError> {
         for plot in &info.plots {
             for (series, color) in plot.series.iter().zip(OKABE_ITO.iter().cycle()) {
-                let name = if plot.log10 {
-                    format!("log10 {}", series.name)
-                } else {
-                    series.name.clone()
-                };
+                let name =
+                    if plot.log10 { format!("log10 {}", series.name) } else { series.name.clone() };
                 self.rec.log_static(
                     self.paths.curve(&series.path, plot.log10),
                     &archetypes::SeriesLines::new()
@@ -454,10 +440,7 @@ impl RerunLog {
     }
 
     fn scalar(&self, scalar: &Scalar) -> Result<(), RecordError> {
-        self.rec.log(
-            self.paths.at(&scalar.path),
-            &archetypes::Scalars::single(scalar.value),
-        )?;
+        self.rec.log(self.paths.at(&scalar.path), &archetypes::Scalars::single(scalar.value))?;
         if self.logarithms.contains(&scalar.path) {
             let exponent = scalar.value.abs().log10();
             if exponent.is_finite() {
@@ -521,15 +504,8 @@ impl RerunLog {
     }
 
     fn field(&mut self, field: &GridField) -> Result<(), RecordError> {
-        expect_length(
-            &format!("field {}", field.name),
-            field.values.len(),
-            field.nx * field.ny,
-        )?;
-        let signed = self
-            .quantities
-            .get(&field.name)
-            .is_some_and(|quantity| quantity.signed);
+        expect_length(&format!("field {}", field.name), field.values.len(), field.nx * field.ny)?;
+        let signed = self.quantities.get(&field.name).is_some_and(|quantity| quantity.signed);
         let scale = ColorScale::new(field.range, signed);
         let path = self.paths.field(&field.name);
         let [x, y] = field.origin;
@@ -602,17 +578,11 @@ impl RerunLog {
                 self.paths.field(&line.field).join(&"isolines".into())
             } else {
                 let part = EntityPathPart::new(line.field.clone());
-                self.paths
-                    .at("world/isolines")
-                    .join(&EntityPath::new(vec![part]))
+                self.paths.at("world/isolines").join(&EntityPath::new(vec![part]))
             };
             groups.entry(path).or_default().push(line);
         }
-        for gone in self
-            .isolines
-            .iter()
-            .filter(|path| !groups.contains_key(path))
-        {
+        for gone in self.isolines.iter().filter(|path| !groups.contains_key(path)) {
             self.rec.log(gone.clone(), &archetypes::Clear::flat())?;
         }
         for (path, lines) in &groups {
@@ -679,10 +649,6 @@ fn expect_length(what: &str, found: usize, expected: usize) -> Result<(), Record
     if found == expected {
         Ok(())
     } else {
-        Err(RecordError::Length {
-            what: what.to_owned(),
-            found,
-            expected,
-        })
+        Err(RecordError::Length { what: what.to_owned(), found, expected })
     }
 }

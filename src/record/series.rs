@@ -14,8 +14,18 @@ pub struct SeriesWriter {
 /// Names of the columns of a plan's series.
 pub fn columns(plan: &Plan) -> Vec<String> {
     let mut list: Vec<String> = [
-        "step", "time", "dt", "dt_limiter", "wall", "power_in", "dissipation", "power_error",
-        "divergence_error", "volume_error", "iterations", "particles",
+        "step",
+        "time",
+        "dt",
+        "dt_limiter",
+        "wall",
+        "power_in",
+        "dissipation",
+        "power_error",
+        "divergence_error",
+        "volume_error",
+        "iterations",
+        "particles",
     ]
     .map(String::from)
     .to_vec();
@@ -25,8 +35,17 @@ pub fn columns(plan: &Plan) -> Vec<String> {
         list.push(format!("{prefix}outflow_rate"));
     }
     list.extend(
-        ["max_speed", "potential_energy", "work", "dissipated", "director_error", "active_rotation",
-         "splits", "merges", "held"]
+        [
+            "max_speed",
+            "potential_energy",
+            "work",
+            "dissipated",
+            "director_error",
+            "active_rotation",
+            "splits",
+            "merges",
+            "held",
+        ]
         .map(String::from),
     );
     list.extend(plan.state.materials.iter().map(|m| format!("{}.volume_drift", m.name)));

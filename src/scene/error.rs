@@ -86,11 +86,7 @@ impl SceneError {
         if self.place.is_none() {
             self.locate(source);
         }
-        self.related = self
-            .related
-            .into_iter()
-            .map(|e| e.with_source(source))
-            .collect();
+        self.related = self.related.into_iter().map(|e| e.with_source(source)).collect();
         self
     }
 
@@ -114,11 +110,7 @@ impl SceneError {
         if near.map(str::len).all(|length| length <= MAX_LINE) {
             self.text = Some(Arc::new(NamedSource::new(&name, without_controls(text))));
         } else {
-            let help = self
-                .help
-                .take()
-                .map(|help| format!("{help}; "))
-                .unwrap_or_default();
+            let help = self.help.take().map(|help| format!("{help}; ")).unwrap_or_default();
             self.help = Some(format!("{help}at {place}").into());
         }
         self.place = Some(place.into());
@@ -200,16 +192,8 @@ pub(super) fn suggestion(name: &str, what: &str, candidates: &[&str]) -> String 
     if candidates.is_empty() {
         text.push_str(&format!("{what}: none"));
     } else {
-        let shown: Vec<_> = candidates
-            .iter()
-            .take(24)
-            .map(|c| format!("`{c}`"))
-            .collect();
-        let more = if shown.len() < candidates.len() {
-            ", ..."
-        } else {
-            ""
-        };
+        let shown: Vec<_> = candidates.iter().take(24).map(|c| format!("`{c}`")).collect();
+        let more = if shown.len() < candidates.len() { ", ..." } else { "" };
         text.push_str(&format!("{what}: {}{more}", shown.join(", ")));
     }
     text
@@ -217,9 +201,7 @@ pub(super) fn suggestion(name: &str, what: &str, candidates: &[&str]) -> String 
 
 /// The text with control characters masked and cut to a length fit to print.
 fn printable(text: &str) -> String {
-    let shown = text
-        .get(..text.floor_char_boundary(MAX_MESSAGE))
-        .unwrap_or_default();
+    let shown = text.get(..text.floor_char_boundary(MAX_MESSAGE)).unwrap_or_default();
     let ellipsis = if shown.len() < text.len() { "..." } else { "" };
     without_controls(shown) + ellipsis
 }
@@ -242,9 +224,7 @@ mod tests {
         let mut out = String::new();
         let theme = miette::GraphicalTheme::unicode_nocolor();
         let handler = miette::GraphicalReportHandler::new_themed(theme);
-        handler
-            .render_report(&mut out, error)
-            .expect("writes to a string");
+        handler.render_report(&mut out, error).expect("writes to a string");
         out
     }
 
@@ -253,10 +233,7 @@ mod tests {
         let error = SceneError::at(&(7..8), "bad value", "use 3").with_source(&source("a=1\nbé=2"));
         assert_eq!(error.one_line(), "s.toml:2:3: bad value (use 3)");
         let drawn = draw(&error);
-        assert!(
-            drawn.contains("s.toml:2:") && drawn.contains("bé=2"),
-            "{drawn}"
-        );
+        assert!(drawn.contains("s.toml:2:") && drawn.contains("bé=2"), "{drawn}");
         assert!(drawn.contains("use 3"), "{drawn}");
     }
 
@@ -265,24 +242,15 @@ mod tests {
         for span in [3..90, 90..95, 1..2, 0..0, usize::MAX - 1..usize::MAX] {
             let error = SceneError::at(&span, "bad", "").with_source(&source("é"));
             draw(&error);
-            assert!(
-                error.one_line().starts_with("s.toml:1:"),
-                "{}",
-                error.one_line()
-            );
+            assert!(error.one_line().starts_with("s.toml:1:"), "{}", error.one_line());
         }
     }
 
     #[test]
     fn joins_errors() {
         assert!(SceneError::join([]).is_ok());
-        let both = [
-            SceneError::at(&(0..1), "one", ""),
-            SceneError::at(&(4..5), "two", ""),
-        ];
-        let error = SceneError::join(both)
-            .expect_err("two")
-            .with_source(&source("a=1\nb=2"));
+        let both = [SceneError::at(&(0..1), "one", ""), SceneError::at(&(4..5), "two", "")];
+        let error = SceneError::join(both).expect_err("two").with_source(&source("a=1\nb=2"));
         assert_eq!(error.lines(), ["s.toml:1:1: one", "s.toml:2:1: two"]);
         assert!(draw(&error).contains("s.toml:2:1"));
     }

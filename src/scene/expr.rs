@@ -76,13 +76,8 @@ fn truth(yes: bool) -> f64 {
 
 /// The functions and constants an expression may use.
 pub fn builtin_names() -> impl Iterator<Item = &'static str> {
-    let unary = UNARY
-        .iter()
-        .map(|(name, _)| *name)
-        .filter(|name| *name != "-");
-    unary
-        .chain(BINARY.iter().map(|(name, _)| *name))
-        .chain(CONSTANTS.iter().map(|(name, _)| *name))
+    let unary = UNARY.iter().map(|(name, _)| *name).filter(|name| *name != "-");
+    unary.chain(BINARY.iter().map(|(name, _)| *name)).chain(CONSTANTS.iter().map(|(name, _)| *name))
 }
 
 /// Whether the text can be a name in expressions.
@@ -107,25 +102,14 @@ struct Operators;
 impl MakeOperators<f64> for Operators {
     fn make<'a>() -> Vec<Operator<'a, f64>> {
         // Everything is in parentheses: priorities do not matter.
-        let bin = |apply| BinOp {
-            apply,
-            prio: 0,
-            is_commutative: false,
-        };
+        let bin = |apply| BinOp { apply, prio: 0, is_commutative: false };
         let infix =
-            INFIX.iter().map(
-                |&(text, _, apply)| match UNARY.iter().find(|u| u.0 == text) {
-                    Some(&(_, unary)) => Operator::make_bin_unary(text, bin(apply), unary),
-                    None => Operator::make_bin(text, bin(apply)),
-                },
-            );
-        let unary = UNARY
-            .iter()
-            .filter(|u| u.0 != "-")
-            .map(|&(t, f)| Operator::make_unary(t, f));
-        let binary = BINARY
-            .iter()
-            .map(|&(text, apply)| Operator::make_bin(text, bin(apply)));
+            INFIX.iter().map(|&(text, _, apply)| match UNARY.iter().find(|u| u.0 == text) {
+                Some(&(_, unary)) => Operator::make_bin_unary(text, bin(apply), unary),
+                None => Operator::make_bin(text, bin(apply)),
+            });
+        let unary = UNARY.iter().filter(|u| u.0 != "-").map(|&(t, f)| Operator::make_unary(t, f));
+        let binary = BINARY.iter().map(|&(text, apply)| Operator::make_bin(text, bin(apply)));
         infix.chain(unary).chain(binary).collect()
     }
 }
@@ -166,26 +150,13 @@ impl Expr {
         coordinates: bool,
     ) -> Result<Self, ExprError> {
         if text.len() > MAX_LENGTH {
-            let message = format!(
-                "the expression has {} bytes, more than {MAX_LENGTH}",
-                text.len()
-            );
+            let message =
+                format!("the expression has {} bytes, more than {MAX_LENGTH}", text.len());
             let help = "split it with the help of [parameters]".to_owned();
-            return Err(ExprError {
-                message,
-                help,
-                at: 0..text.len(),
-            });
+            return Err(ExprError { message, help, at: 0..text.len() });
         }
-        let mut reader = Reader {
-            text,
-            pos: 0,
-            depth: 0,
-            names,
-            known,
-            coordinates,
-            uses: [false; 2],
-        };
+        let mut reader =
+            Reader { text, pos: 0, depth: 0, names, known, coordinates, uses: [false; 2] };
         let canonical = reader.expression(0)?;
         if let Some(rest) = reader.rest().chars().next() {
             let what = match rest {
@@ -200,10 +171,7 @@ impl Expr {
             help: String::new(),
             at: 0..text.len(),
         })?;
-        Ok(Expr(Arc::new(Inner {
-            flat,
-            uses: reader.uses,
-        })))
+        Ok(Expr(Arc::new(Inner { flat, uses: reader.uses })))
     }
 
     /// Whether the value depends on `x` or `y`.
@@ -254,11 +222,7 @@ impl<'t> Reader<'t, '_> {
         length: usize,
     ) -> ExprError {
         let at = self.pos..self.text.len().min(self.pos + length);
-        ExprError {
-            message: message.into(),
-            help: help.into(),
-            at,
-        }
+        ExprError { message: message.into(), help: help.into(), at }
     }
 
     fn eat(&mut self, token: &str) -> bool {
@@ -286,9 +250,8 @@ impl<'t> Reader<'t, '_> {
     fn expression(&mut self, tightness: u8) -> Result<String, ExprError> {
         let mut left = self.operand()?;
         let mut compared = false;
-        while let Some(&(token, tight, _)) = INFIX
-            .iter()
-            .find(|op| op.1 >= tightness && self.rest().starts_with(op.0))
+        while let Some(&(token, tight, _)) =
+            INFIX.iter().find(|op| op.1 >= tightness && self.rest().starts_with(op.0))
         {
             if tight == COMPARISON && std::mem::replace(&mut compared, true) {
                 let help = "join comparisons with &&: `0 < x && x < 1`";
@@ -334,10 +297,7 @@ impl<'t> Reader<'t, '_> {
             let (message, length) = match rest.chars().next() {
                 None if self.text.trim().is_empty() => ("the expression is empty".to_owned(), 0),
                 None => ("the expression ends too early".to_owned(), 0),
-                Some(c) => (
-                    format!("expected a number, a name or `(`, found `{c}`"),
-                    c.len_utf8(),
-                ),
+                Some(c) => (format!("expected a number, a name or `(`, found `{c}`"), c.len_utf8()),
             };
             return Err(self.error(message, "", length));
         }
@@ -401,16 +361,8 @@ impl<'t> Reader<'t, '_> {
             (given, _) => {
                 let wanted = if unary { "1 argument" } else { "2 arguments" };
                 let message = format!("`{name}` takes {wanted}, not {}", given.len());
-                let help = if unary {
-                    ""
-                } else {
-                    "nest calls for more: min(a, min(b, c))"
-                };
-                Err(ExprError {
-                    message,
-                    help: help.into(),
-                    at: start..self.pos,
-                })
+                let help = if unary { "" } else { "nest calls for more: min(a, min(b, c))" };
+                Err(ExprError { message, help: help.into(), at: start..self.pos })
             }
         }
     }
@@ -418,30 +370,16 @@ impl<'t> Reader<'t, '_> {
     fn unknown(&self, name: &str) -> ExprError {
         let (message, help) = if name == "x" || name == "y" {
             let help = "write a number or an expression in the scene's parameters";
-            (
-                format!("`{name}` is a coordinate, on which this value cannot depend"),
-                help.into(),
-            )
-        } else if UNARY
-            .iter()
-            .map(|f| f.0)
-            .chain(BINARY.iter().map(|f| f.0))
-            .any(|f| f == name)
-        {
-            (
-                format!("`{name}` is a function"),
-                format!("write {name}(...)"),
-            )
+            (format!("`{name}` is a coordinate, on which this value cannot depend"), help.into())
+        } else if UNARY.iter().map(|f| f.0).chain(BINARY.iter().map(|f| f.0)).any(|f| f == name) {
+            (format!("`{name}` is a function"), format!("write {name}(...)"))
         } else {
             let mut known = (self.known)();
             if self.coordinates {
                 known.extend(["x", "y"]);
             }
             known.push("pi");
-            (
-                format!("unknown name `{name}`"),
-                suggestion(name, "known names are", &known),
-            )
+            (format!("unknown name `{name}`"), suggestion(name, "known names are", &known))
         };
         self.error(message, help, name.len())
     }
@@ -453,23 +391,13 @@ fn is_constant(name: &str) -> bool {
 
 /// A number as `exmex` is to read it.
 fn literal(value: f64) -> String {
-    if value.is_sign_negative() {
-        format!("(-({:e}))", -value)
-    } else {
-        format!("{value:e}")
-    }
+    if value.is_sign_negative() { format!("(-({:e}))", -value) } else { format!("{value:e}") }
 }
 
 /// Bytes of the unsigned number the text starts with, such as `2`, `.5`, `2.5E-6`.
 fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
-    let digits = |from: usize| {
-        bytes
-            .iter()
-            .skip(from)
-            .take_while(|b| b.is_ascii_digit())
-            .count()
-    };
+    let digits = |from: usize| bytes.iter().skip(from).take_while(|b| b.is_ascii_digit()).count();
     let whole = digits(0);
     let mut end = whole;
     if bytes.get(end) == Some(&b'.') {
@@ -494,9 +422,7 @@ fn name_length(text: &str) -> usize {
     if text.starts_with(|c: char| c.is_ascii_digit()) {
         return 0;
     }
-    text.bytes()
-        .take_while(|b| b.is_ascii_alphanumeric() || *b == b'_')
-        .count()
+    text.bytes().take_while(|b| b.is_ascii_alphanumeric() || *b == b'_').count()
 }
 
 #[cfg(test)]
@@ -513,9 +439,7 @@ mod tests {
     }
 
     fn value(text: &str) -> f64 {
-        parse(text)
-            .unwrap_or_else(|e| panic!("{text}: {e:?}"))
-            .at(0.5, -1.5)
+        parse(text).unwrap_or_else(|e| panic!("{text}: {e:?}")).at(0.5, -1.5)
     }
 
     #[test]
@@ -555,11 +479,7 @@ mod tests {
             ("floor(1.7)+ceil(1.2)+round(2.5)", 6.0),
             ("sign(-3)+sign(0)+sign(a)", 0.0),
         ] {
-            assert!(
-                (value(text) - expected).abs() < 1e-14,
-                "{text} = {}",
-                value(text)
-            );
+            assert!((value(text) - expected).abs() < 1e-14, "{text} = {}", value(text));
         }
     }
 
@@ -603,24 +523,9 @@ mod tests {
     #[test]
     fn says_what_is_wrong_and_where() {
         for (text, at, message, help) in [
-            (
-                "1 + alhpa",
-                4..9,
-                "unknown name `alhpa`",
-                "known names are: `a`",
-            ),
-            (
-                "1 + minimun",
-                4..11,
-                "unknown name",
-                "did you mean `minimum`?",
-            ),
-            (
-                "srqt(2)",
-                0..4,
-                "unknown function `srqt`",
-                "did you mean `sqrt`?",
-            ),
+            ("1 + alhpa", 4..9, "unknown name `alhpa`", "known names are: `a`"),
+            ("1 + minimun", 4..11, "unknown name", "did you mean `minimum`?"),
+            ("srqt(2)", 0..4, "unknown function `srqt`", "did you mean `sqrt`?"),
             ("sqrt", 0..4, "`sqrt` is a function", "sqrt(...)"),
             ("sqrt(1, 2)", 0..10, "takes 1 argument, not 2", ""),
             ("min(1)", 0..6, "takes 2 arguments, not 1", "nest"),
@@ -647,16 +552,10 @@ mod tests {
     fn limits_length_and_depth() {
         let nested = |n: usize| "(".repeat(n) + "1" + &")".repeat(n);
         assert_eq!(value(&nested(MAX_DEPTH)), 1.0);
-        for deep in [
-            nested(900),
-            "-".repeat(1999) + "1",
-            "2^".repeat(900) + "1",
-            "sin(".repeat(500),
-        ] {
-            assert!(
-                parse(&deep).is_err_and(|e| e.message.contains("nested deeper")),
-                "{deep}"
-            );
+        for deep in
+            [nested(900), "-".repeat(1999) + "1", "2^".repeat(900) + "1", "sin(".repeat(500)]
+        {
+            assert!(parse(&deep).is_err_and(|e| e.message.contains("nested deeper")), "{deep}");
         }
         let sum = "x+".repeat(999) + "x";
         assert_eq!(value(&sum), 500.0);
@@ -687,10 +586,7 @@ mod tests {
             5 => (format!("sin{left}"), l.sin()),
             6 => (format!("min({left}, {right})"), l.min(r)),
             7 => (format!("-cos({left}*{left} - {right})"), -(l * l - r).cos()),
-            _ => (
-                format!("1 - -{left}^2*3 + abs({right})"),
-                1.0 + l.powf(2.0) * 3.0 + r.abs(),
-            ),
+            _ => (format!("1 - -{left}^2*3 + abs({right})"), 1.0 + l.powf(2.0) * 3.0 + r.abs()),
         }
     }
 
@@ -698,9 +594,7 @@ mod tests {
     fn evaluates_random_expressions() {
         let mut state = 3u64;
         let mut random = |n: usize| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 33) as usize % n
         };
         for _ in 0..3000 {
@@ -724,16 +618,13 @@ mod tests {
 
     #[test]
     fn random_texts_never_panic() {
-        let parts = [
-            "x", "a", "1e", ".", "(", ")", "-", "^", "min", ",", "<", "&&", "é", "{", "sin(", " ",
-        ];
+        let parts =
+            ["x", "a", "1e", ".", "(", ")", "-", "^", "min", ",", "<", "&&", "é", "{", "sin(", " "];
         let mut state = 1u64;
         for _ in 0..20_000 {
             let mut text = String::new();
             for _ in 0..12 {
-                state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
                 text.push_str(parts[(state >> 60) as usize]);
             }
             if let Ok(e) = parse(&text) {

@@ -33,10 +33,7 @@ pub struct SceneSource {
 impl SceneSource {
     /// A text and its name.
     pub fn new(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Self {
-        SceneSource {
-            name: name.into(),
-            text: text.into(),
-        }
+        SceneSource { name: name.into(), text: text.into() }
     }
 
     /// The path of the file, or the name of the preset.
@@ -60,45 +57,26 @@ pub fn load(path: impl AsRef<Path>) -> Result<SceneSource, SceneError> {
             "there is no such file",
             "give the path of a scene file (TOML) or a preset's name",
         ),
-        _ => fault(
-            &format!("cannot be read: {e}"),
-            "check the file and its permissions",
-        ),
+        _ => fault(&format!("cannot be read: {e}"), "check the file and its permissions"),
     };
     if path.is_dir() {
-        return Err(fault(
-            "is a directory",
-            "give the path of a scene file (TOML) in it",
-        ));
+        return Err(fault("is a directory", "give the path of a scene file (TOML) in it"));
     }
     let mut bytes = vec![];
     let file = File::open(path).map_err(unreadable)?;
-    file.take(MAX_BYTES as u64 + 1)
-        .read_to_end(&mut bytes)
-        .map_err(unreadable)?;
+    file.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() > MAX_BYTES {
         let help = "a scene is a TOML text of some kilobytes; is this another kind of file?";
-        return Err(fault(
-            "is larger than 1 MiB, the most a scene may have",
-            help,
-        ));
+        return Err(fault("is larger than 1 MiB, the most a scene may have", help));
     }
     let text = String::from_utf8(bytes).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
-        let line = 1 + e
-            .as_bytes()
-            .iter()
-            .take(at)
-            .filter(|&&b| b == b'\n')
-            .count();
+        let line = 1 + e.as_bytes().iter().take(at).filter(|&&b| b == b'\n').count();
         let what = format!("is not UTF-8 text: byte {at}, in line {line}");
         fault(&what, "a scene is a TOML text; save it as UTF-8")
     })?;
     if text.trim().is_empty() {
-        return Err(fault(
-            "is empty",
-            "start from a preset, or with `schema = 1`",
-        ));
+        return Err(fault("is empty", "start from a preset, or with `schema = 1`"));
     }
     Ok(SceneSource::new(name, text))
 }
@@ -182,9 +160,7 @@ pub(super) fn table(source: &SceneSource) -> Result<Spanned<DeTable<'_>>, SceneE
         let mut lines = HashSet::new();
         all.sort_by_key(|e| e.span().map(|span| span.start));
         let one_a_line = all.iter().take(100).filter(|e| lines.insert(line(e)));
-        error = SceneError::join(one_a_line.take(MAX_ERRORS).map(syntax))
-            .err()
-            .unwrap_or(error);
+        error = SceneError::join(one_a_line.take(MAX_ERRORS).map(syntax)).err().unwrap_or(error);
     }
     Err(error.with_source(source))
 }
@@ -214,25 +190,16 @@ fn check_schema(root: &Spanned<DeTable>) -> Result<(), SceneError> {
             let message = format!("schema {i} is not known");
             Err(SceneError::at(&schema.span(), message, help))
         }
-        _ => Err(SceneError::at(
-            &schema.span(),
-            "`schema` is not a whole number",
-            help,
-        )),
+        _ => Err(SceneError::at(&schema.span(), "`schema` is not a whole number", help)),
     }
 }
 
 /// Replaces the key or text at a place in the table by what was meant; takes the key out if that
 /// is not known.
 fn repair(table: &mut DeTable, span: &Range<usize>, meant: Option<&str>) -> bool {
-    let key = table
-        .keys()
-        .find(|key| key.span() == *span)
-        .map(|key| key.get_ref().to_string());
+    let key = table.keys().find(|key| key.span() == *span).map(|key| key.get_ref().to_string());
     let Some(key) = key else {
-        return table
-            .iter_mut()
-            .any(|(_, value)| repair_in(value, span, meant));
+        return table.iter_mut().any(|(_, value)| repair_in(value, span, meant));
     };
     let value = table.remove(key.as_str());
     if let (Some(value), Some(meant)) = (value, meant)
@@ -265,9 +232,7 @@ fn quoted(message: &str) -> impl Iterator<Item = &str> {
 fn translate(e: &toml::de::Error) -> SceneError {
     let said = e.message();
     let shown = e.to_string();
-    let table = shown
-        .lines()
-        .find_map(|line| line.strip_prefix("in `")?.strip_suffix('`'));
+    let table = shown.lines().find_map(|line| line.strip_prefix("in `")?.strip_suffix('`'));
     let within = table.map(|t| format!(" in `{t}`")).unwrap_or_default();
     let mut words = quoted(said);
     let name = words.next().unwrap_or_default();
@@ -277,25 +242,13 @@ fn translate(e: &toml::de::Error) -> SceneError {
         let parent = table.and_then(|t| t.strip_suffix(name)?.strip_suffix('.'));
         let within = parent.map(|t| format!(" in `{t}`")).unwrap_or_default();
         let help = suggestion(name, "keys are", &known);
-        (
-            format!("unknown key `{name}`{within}"),
-            help,
-            "not a key of this table",
-        )
+        (format!("unknown key `{name}`{within}"), help, "not a key of this table")
     } else if said.starts_with("unknown variant") {
         let help = suggestion(name, "choices are", &known);
-        (
-            format!("unknown choice `{name}`{within}"),
-            help,
-            "not a choice",
-        )
+        (format!("unknown choice `{name}`{within}"), help, "not a choice")
     } else if said.starts_with("missing field") {
         let help = format!("add `{name} = ...`");
-        (
-            format!("key `{name}` is missing{within}"),
-            help,
-            "belongs into this table",
-        )
+        (format!("key `{name}` is missing{within}"), help, "belongs into this table")
     } else if let Some((keys, known)) = said
         .strip_prefix("unexpected keys in table: ")
         .and_then(|rest| rest.split_once(", available keys: "))
@@ -303,25 +256,13 @@ fn translate(e: &toml::de::Error) -> SceneError {
         let known: Vec<_> = known.split(", ").collect();
         let key = keys.split(", ").next().unwrap_or_default();
         let help = suggestion(key, "keys are", &known);
-        (
-            format!("unknown key `{key}`{within}"),
-            help,
-            "not a key of this table",
-        )
+        (format!("unknown key `{key}`{within}"), help, "not a key of this table")
     } else if said.starts_with("wanted exactly 1 element") {
         let help = "give exactly one of the choices".to_owned();
-        (
-            format!("a choice is needed{within}"),
-            help,
-            "not one choice",
-        )
+        (format!("a choice is needed{within}"), help, "not one choice")
     } else if let Some((found, wanted)) = said.rsplit_once(", expected ") {
         let wanted = plain(wanted);
-        (
-            format!("{found}{within}"),
-            format!("expected {wanted}"),
-            "this value",
-        )
+        (format!("{found}{within}"), format!("expected {wanted}"), "this value")
     } else {
         (format!("{said}{within}"), String::new(), "here")
     };
@@ -352,10 +293,7 @@ pub fn to_toml(scene: &Scene) -> String {
 
 /// Names a scene by what it says: SHA-256 of [`to_toml`], in hexadecimal digits.
 pub fn scene_hash(scene: &Scene) -> String {
-    Sha256::digest(to_toml(scene))
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    Sha256::digest(to_toml(scene)).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The JSON schema of scene files, for editors.
@@ -430,30 +368,14 @@ mod tests {
     #[test]
     fn says_what_is_wrong_and_where() {
         for row in FAULTS.trim().lines() {
-            let cells: Vec<_> = row
-                .split('|')
-                .map(|c| c.trim().replace("\\n", "\n"))
-                .collect();
-            let [from, to, at, message, help] = cells.as_slice() else {
-                panic!("{row}")
-            };
+            let cells: Vec<_> = row.split('|').map(|c| c.trim().replace("\\n", "\n")).collect();
+            let [from, to, at, message, help] = cells.as_slice() else { panic!("{row}") };
             let found = lines(&with(&[(from, to)]));
             let first = found.first().unwrap_or_else(|| panic!("{row}: no error"));
-            assert!(
-                first.contains(message) && first.contains(help),
-                "{row}: {first}"
-            );
+            assert!(first.contains(message) && first.contains(help), "{row}: {first}");
             if let Some((lead, _)) = to.split_once(at.as_str()) {
-                let before = silo()
-                    .text()
-                    .split(from)
-                    .next()
-                    .unwrap_or_default()
-                    .to_owned();
-                assert!(
-                    first.starts_with(&place(&(before + lead))),
-                    "{row}: {first}"
-                );
+                let before = silo().text().split(from).next().unwrap_or_default().to_owned();
+                assert!(first.starts_with(&place(&(before + lead))), "{row}: {first}");
             }
         }
     }
@@ -469,10 +391,7 @@ mod tests {
         ]);
         let found = lines(&text);
         assert_eq!(found.len(), 5, "{found:#?}");
-        let found = lines(&with(&[
-            ("min = 0", "min = 7"),
-            ("default = 7", "default = \"z\""),
-        ]));
+        let found = lines(&with(&[("min = 0", "min = 7"), ("default = 7", "default = \"z\"")]));
         assert_eq!(found.len(), 2, "{found:#?}");
         let found = lines("schema = 1\na = b\nc = d\n[\n");
         assert_eq!(found.len(), 3, "{found:#?}");
@@ -496,10 +415,7 @@ mod tests {
             granular = { porosity = 0.5, coordination = 4, normal_dashpot = 1, tangential_dashpot = 1 }
         ";
         let grading = ("grading = [{ towards = \"apertures\", factor = 2 }]", "");
-        let lines_of_dye = (
-            "[dye.grid]",
-            "[dye]\nlines = [[[0, 1], [1, \"1\"]]]\n[dye.grid]",
-        );
+        let lines_of_dye = ("[dye.grid]", "[dye]\nlines = [[[0, 1], [1, \"1\"]]]\n[dye.grid]");
         let text = with(&[grading, lines_of_dye]) + more;
         let scene =
             parse(&SceneSource::new("s.toml", text)).unwrap_or_else(|e| panic!("{:?}", e.lines()));
@@ -508,18 +424,10 @@ mod tests {
         assert_eq!(to_toml(&again), written);
         assert_eq!(scene_hash(&again), scene_hash(&scene));
         assert_eq!(scene_hash(&scene).len(), 64);
-        for default in [
-            "tolerance = ",
-            "courant = ",
-            "frames = 100",
-            "incompressible = true",
-        ] {
+        for default in ["tolerance = ", "courant = ", "frames = 100", "incompressible = true"] {
             assert!(written.contains(default), "{default}");
         }
-        let other = silo()
-            .with_sets(&["alpha=1".into()])
-            .and_then(|s| parse(&s))
-            .expect("valid");
+        let other = silo().with_sets(&["alpha=1".into()]).and_then(|s| parse(&s)).expect("valid");
         assert_ne!(scene_hash(&other), scene_hash(&scene));
     }
 
@@ -527,20 +435,13 @@ mod tests {
     fn parameters_use_those_above() {
         let text = with(&[("default = 7", "default = \"6 + 3*alpha\"")]);
         let scene = parse(&SceneSource::new("s.toml", text)).expect("valid");
-        assert_eq!(
-            Scope::new(&scene).ok().and_then(|s| s.get("fill_height")),
-            Some(7.0)
-        );
+        assert_eq!(Scope::new(&scene).ok().and_then(|s| s.get("fill_height")), Some(7.0));
         let half = |name: &str| (name == "alpha").then_some(0.5);
         let scope = Scope::with_overrides(&scene, half).expect("in range");
         assert_eq!(scope.get("fill_height"), Some(7.5));
         assert!(Scope::with_overrides(&scene, |_| Some(f64::NAN)).is_err());
         let below = with(&[("\"1/3\"", "\"aperture/3\"")]);
-        assert!(
-            lines(&below)[0].contains("unknown name `aperture`"),
-            "{:?}",
-            lines(&below)
-        );
+        assert!(lines(&below)[0].contains("unknown name `aperture`"), "{:?}", lines(&below));
     }
 
     #[test]
@@ -551,18 +452,14 @@ mod tests {
             fs::write(&path, bytes).expect("writes");
             path
         };
-        let big: Vec<u8> = (0..10_000_000u32)
-            .map(|i| (i.wrapping_mul(2654435761) >> 24) as u8)
-            .collect();
+        let big: Vec<u8> =
+            (0..10_000_000u32).map(|i| (i.wrapping_mul(2654435761) >> 24) as u8).collect();
         let start = Instant::now();
         for (path, message) in [
             (folder.path().join("none.toml"), "there is no such file"),
             (folder.path().to_owned(), "is a directory"),
             (file("empty.toml", b" \n"), "is empty"),
-            (
-                file("latin.toml", b"a = 1\nb = \"\xe9\""),
-                "is not UTF-8 text: byte 11, in line 2",
-            ),
+            (file("latin.toml", b"a = 1\nb = \"\xe9\""), "is not UTF-8 text: byte 11, in line 2"),
             (file("big.toml", &big), "larger than 1 MiB"),
             ("/dev/zero".into(), "larger than 1 MiB"),
         ] {
@@ -596,11 +493,7 @@ mod tests {
                 source.with_sets(&["name=a".into()]).is_err() || source.text().starts_with("[[a")
             );
             assert!(error.lines().iter().all(|line| line.len() < 2000));
-            assert!(
-                start.elapsed() < Duration::from_secs(2),
-                "{:?}",
-                start.elapsed()
-            );
+            assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
         }
     }
 
@@ -608,49 +501,34 @@ mod tests {
     fn many_errors_are_cut_short() {
         let rows = (0..20_000).map(|i| format!("[parameters.p{i}]\ndefault = \"q{i}\"\n"));
         let start = Instant::now();
-        let found = lines(&with(&[(
-            "[domain]",
-            &(rows.collect::<String>() + "[domain]"),
-        )]));
+        let found = lines(&with(&[("[domain]", &(rows.collect::<String>() + "[domain]"))]));
         assert_eq!(found.len(), MAX_ERRORS, "{found:#?}");
-        assert!(
-            start.elapsed() < Duration::from_secs(5),
-            "{:?}",
-            start.elapsed()
-        );
+        assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
     }
 
     #[test]
     fn garbage_never_panics() {
         let mut state = 7u64;
         let mut random = |n: usize| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 33) as usize % n
         };
-        let pieces = [
-            "[", "]", "{", "}", "=", "\"", "\n", ".", ",", "1e999", "é", "\u{1b}", "nan", "x",
-        ];
+        let pieces =
+            ["[", "]", "{", "}", "=", "\"", "\n", ".", ",", "1e999", "é", "\u{1b}", "nan", "x"];
         for _ in 0..600 {
             let mut text: Vec<char> = silo().text().chars().collect();
             for _ in 0..=random(6) {
                 let at = random(text.len());
                 match random(3) {
                     0 => _ = text.drain(at..(at + random(40)).min(text.len())),
-                    1 => text
-                        .splice(at..at, pieces[random(pieces.len())].chars())
-                        .for_each(drop),
+                    1 => text.splice(at..at, pieces[random(pieces.len())].chars()).for_each(drop),
                     _ => text.truncate(at.max(1)),
                 }
             }
             let source = SceneSource::new("s.toml", text.into_iter().collect::<String>());
             if let Err(error) = parse(&source).and_then(|scene| Scope::new(&scene)) {
                 let error = error.with_source(&source);
-                assert!(
-                    error.lines().iter().all(|line| line.starts_with("s.toml")),
-                    "{error:?}"
-                );
+                assert!(error.lines().iter().all(|line| line.starts_with("s.toml")), "{error:?}");
                 assert!(!format!("{:?}", miette::Report::new(error)).is_empty());
             }
             _ = source.with_sets(&["alpha=1".into(), "walls[0].kind=no_slip".into()]);

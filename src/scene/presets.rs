@@ -17,14 +17,9 @@ const PRESETS: [(&str, &str); 7] = [
 /// Names and one-line descriptions, in the order to show them.
 pub fn list() -> Vec<(&'static str, String)> {
     let description = |name, text| {
-        parse(&SceneSource::new(name, text))
-            .map(|scene| scene.description)
-            .unwrap_or_default()
+        parse(&SceneSource::new(name, text)).map(|scene| scene.description).unwrap_or_default()
     };
-    PRESETS
-        .iter()
-        .map(|&(name, text)| (name, description(name, text)))
-        .collect()
+    PRESETS.iter().map(|&(name, text)| (name, description(name, text))).collect()
 }
 
 /// The preset of a name.
@@ -34,10 +29,7 @@ pub fn find(name: &str) -> Result<SceneSource, SceneError> {
         None => {
             let names: Vec<_> = PRESETS.iter().map(|preset| preset.0).collect();
             let help = suggestion(name, "presets are", &names);
-            Err(SceneError::new(
-                format!("there is no preset `{name}`"),
-                help,
-            ))
+            Err(SceneError::new(format!("there is no preset `{name}`"), help))
         }
     }
 }
@@ -63,11 +55,7 @@ mod tests {
     #[test]
     fn suggests_presets() {
         let error = find("silos").expect_err("not a preset");
-        assert!(
-            error.one_line().contains("did you mean `silo`?"),
-            "{}",
-            error.one_line()
-        );
+        assert!(error.one_line().contains("did you mean `silo`?"), "{}", error.one_line());
     }
 
     #[test]
@@ -75,12 +63,7 @@ mod tests {
         let scene = parse(&find("silo").expect("listed")).expect("valid");
         let scope = Scope::new(&scene).expect("valid");
         let grains = &scene.materials["grains"];
-        let length = grains
-            .internal_length
-            .as_ref()
-            .expect("given")
-            .eval(&scope)
-            .expect("valid");
+        let length = grains.internal_length.as_ref().expect("given").eval(&scope).expect("valid");
         assert!((length - 1.0 / 3.0).abs() < 1e-15);
         assert_eq!(scene.domain.x[0].eval(&scope).expect("valid"), -3.0);
         assert_eq!(scene.walls.len(), 4);

@@ -37,18 +37,12 @@ enum Raw {
 impl<const XY: bool> Value<XY> {
     /// A number that stands in no file.
     pub fn number(value: f64) -> Self {
-        Value {
-            raw: Raw::Number(value),
-            span: None,
-        }
+        Value { raw: Raw::Number(value), span: None }
     }
 
     /// An expression that stands in no file.
     pub fn expression(text: impl Into<Box<str>>) -> Self {
-        Value {
-            raw: Raw::Text(text.into()),
-            span: None,
-        }
+        Value { raw: Raw::Text(text.into()), span: None }
     }
 
     /// Its bytes in the scene's text, quotes included.
@@ -70,11 +64,7 @@ impl<const XY: bool> Value<XY> {
             Some(s) => Some(s.start + 1 + error.at.start..s.start + 1 + error.at.end),
             None => self.span(),
         };
-        SceneError::at(
-            &place,
-            format!("{} in {}", error.message, self.shown()),
-            &error.help,
-        )
+        SceneError::at(&place, format!("{} in {}", error.message, self.shown()), &error.help)
     }
 
     /// As written, cut to a length fit for a message.
@@ -189,10 +179,7 @@ impl<const XY: bool> Serialize for Value<XY> {
 impl<'de, const XY: bool> Deserialize<'de> for Value<XY> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let spanned = Spanned::<Raw>::deserialize(deserializer)?;
-        Ok(Value {
-            span: Some(spanned.span()),
-            raw: spanned.into_inner(),
-        })
+        Ok(Value { span: Some(spanned.span()), raw: spanned.into_inner() })
     }
 }
 
@@ -223,9 +210,7 @@ impl Visitor<'_> for RawVisitor {
         if value.is_finite() {
             Ok(Raw::Number(value))
         } else {
-            Err(E::custom(format_args!(
-                "{value} is not finite, expected a finite number"
-            )))
+            Err(E::custom(format_args!("{value} is not finite, expected a finite number")))
         }
     }
 
@@ -240,11 +225,7 @@ impl<const XY: bool> JsonSchema for Value<XY> {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let names = if XY {
-            "the scene's parameters, x and y"
-        } else {
-            "the scene's parameters"
-        };
+        let names = if XY { "the scene's parameters, x and y" } else { "the scene's parameters" };
         json_schema!({
             "description": format!("A number, or an expression over {names}."),
             "type": ["number", "string"],
@@ -274,11 +255,8 @@ mod tests {
         let values: Values = toml::from_str(text).expect("valid");
         let span = values.list[2].span().expect("from a file");
         assert_eq!(&text[span], "\"2*alpha\"");
-        let numbers: Vec<_> = values
-            .list
-            .iter()
-            .map(|q| q.eval(&scope()).expect("valid"))
-            .collect();
+        let numbers: Vec<_> =
+            values.list.iter().map(|q| q.eval(&scope()).expect("valid")).collect();
         assert_eq!(numbers, [1.0, 2.5, 1.0]);
         let back: Values =
             toml::from_str(&toml::to_string(&values).expect("serializes")).expect("valid");
@@ -307,20 +285,9 @@ mod tests {
         let text = "field = 0\nlist = [\"1 + alhpa\"]\n";
         let values: Values = toml::from_str(text).expect("valid");
         let source = SceneSource::new("s.toml", text);
-        let error = values.list[0]
-            .eval(&scope())
-            .expect_err("unknown")
-            .with_source(&source);
-        assert!(
-            error
-                .one_line()
-                .starts_with("s.toml:2:14: unknown name `alhpa` in \"1 + alhpa\"")
-        );
-        assert!(
-            error.one_line().contains("did you mean `alpha`?"),
-            "{}",
-            error.one_line()
-        );
+        let error = values.list[0].eval(&scope()).expect_err("unknown").with_source(&source);
+        assert!(error.one_line().starts_with("s.toml:2:14: unknown name `alhpa` in \"1 + alhpa\""));
+        assert!(error.one_line().contains("did you mean `alpha`?"), "{}", error.one_line());
     }
 
     #[test]
@@ -337,14 +304,10 @@ mod tests {
 
     #[test]
     fn fields_depend_on_the_place() {
-        let field = Field::expression("alpha*x + y^2")
-            .compile(&scope())
-            .expect("valid");
+        let field = Field::expression("alpha*x + y^2").compile(&scope()).expect("valid");
         assert_eq!(field.constant(), None);
         assert_eq!(field.at(2.0, 3.0), 10.0);
-        let constant = Field::expression("alpha*2")
-            .compile(&scope())
-            .expect("valid");
+        let constant = Field::expression("alpha*2").compile(&scope()).expect("valid");
         assert_eq!(constant.constant(), Some(1.0));
         assert_ne!(field, constant);
         fn shareable<T: Send + Sync + Clone + fmt::Debug>(_: &T) {}

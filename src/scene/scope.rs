@@ -49,12 +49,7 @@ impl Scope {
 
     /// A scope of given values.
     pub fn from_values<'a>(values: impl IntoIterator<Item = (&'a str, f64)>) -> Scope {
-        Scope {
-            values: values
-                .into_iter()
-                .map(|(name, value)| (name.into(), value))
-                .collect(),
-        }
+        Scope { values: values.into_iter().map(|(name, value)| (name.into(), value)).collect() }
     }
 
     /// The value of a parameter.
@@ -78,11 +73,7 @@ impl Scope {
             Some(value) => value,
             None => written.eval(self)?,
         };
-        let bound = |q: &Option<_>| {
-            q.as_ref()
-                .map(|q: &super::Quantity| q.eval(self))
-                .transpose()
-        };
+        let bound = |q: &Option<_>| q.as_ref().map(|q: &super::Quantity| q.eval(self)).transpose();
         let (min, max) = (bound(&parameter.min)?, bound(&parameter.max)?);
         if let (Some(min), Some(max)) = (min, max)
             && min > max

@@ -86,11 +86,7 @@ fn apply(root: &mut Item, set: &str) -> Result<(), Fault> {
     if let [Step::Key(name)] = steps.as_slice() {
         if parameters.contains(name) {
             let value = Step::Key("value".into());
-            steps = vec![
-                Step::Key("parameters".into()),
-                Step::Key(name.clone()),
-                value,
-            ];
+            steps = vec![Step::Key("parameters".into()), Step::Key(name.clone()), value];
         } else if !KEYS.contains(&name.as_str()) {
             let known: Vec<_> = parameters.iter().map(String::as_str).collect();
             let help = suggestion(name, "parameters are", &known);
@@ -126,9 +122,7 @@ fn apply(root: &mut Item, set: &str) -> Result<(), Fault> {
 /// The keys of a table of the scene.
 fn names(root: &Item, table: &str) -> Vec<String> {
     let table = root.get(table).and_then(Item::as_table_like);
-    table
-        .map(|t| t.iter().map(|(name, _)| name.to_owned()).collect())
-        .unwrap_or_default()
+    table.map(|t| t.iter().map(|(name, _)| name.to_owned()).collect()).unwrap_or_default()
 }
 
 /// Walks along the path, making tables that are missing, and writes the value.
@@ -165,17 +159,12 @@ fn write(root: &mut Item, steps: &[Step], text: &str) -> Result<(), Fault> {
                 walked.push_str(key);
             }
             Step::Index(_) if !item.is_array() && !item.is_array_of_tables() => {
-                return fault(
-                    format!("`{walked}` is not a list but: {kind}"),
-                    "leave out `[...]`",
-                );
+                return fault(format!("`{walked}` is not a list but: {kind}"), "leave out `[...]`");
             }
             Step::Index(index) => walked.push_str(&format!("[{index}]")),
         }
         let length = item.as_array().map(|a| a.len());
-        let length = length
-            .or(item.as_array_of_tables().map(|a| a.len()))
-            .unwrap_or(0);
+        let length = length.or(item.as_array_of_tables().map(|a| a.len())).unwrap_or(0);
         let next = match step {
             Step::Key(key) => item.get_mut(key.as_str()),
             Step::Index(index) => item.get_mut(*index),
@@ -193,10 +182,7 @@ fn write(root: &mut Item, steps: &[Step], text: &str) -> Result<(), Fault> {
             *old = new;
             Ok(())
         }
-        None => fault(
-            format!("`{walked}` is a table"),
-            "name one of the keys in it",
-        ),
+        None => fault(format!("`{walked}` is a table"), "name one of the keys in it"),
     }
 }
 
@@ -268,16 +254,9 @@ mod tests {
     fn keeps_the_rest_of_the_text() {
         let before = presets::find("silo").expect("listed");
         let after = set(&["alpha=5/3"]).expect("valid");
-        let new: Vec<_> = after
-            .text()
-            .lines()
-            .filter(|l| !before.text().contains(l))
-            .collect();
+        let new: Vec<_> = after.text().lines().filter(|l| !before.text().contains(l)).collect();
         assert_eq!(new, ["value = \"5/3\""]);
-        assert_eq!(
-            after.text().lines().count(),
-            before.text().lines().count() + 1
-        );
+        assert_eq!(after.text().lines().count(), before.text().lines().count() + 1);
         assert_eq!(set(&["alpha=5/3", "alpha=1"]).ok(), set(&["alpha=1"]).ok());
         assert_eq!(set(&[]).ok(), Some(before));
     }
@@ -304,17 +283,11 @@ mod tests {
         assert_eq!(scene.gravity[1].eval(&scope).ok(), Some(-5.0));
         assert_eq!(scene.regions[0].material, "background");
         assert_eq!(scene.walls[1].kind, crate::scene::WallKind::NoSlip);
-        assert_eq!(
-            scene.boundaries.left.kind,
-            crate::scene::BoundaryKind::NoSlip
-        );
+        assert_eq!(scene.boundaries.left.kind, crate::scene::BoundaryKind::NoSlip);
         assert_eq!(scene.accuracy.cells, 16);
         assert_eq!(scene.recording.times.len(), 2);
         assert_eq!(scene.description, "another one");
-        let density = scene.materials["grains"]
-            .density
-            .compile(&scope)
-            .expect("valid");
+        let density = scene.materials["grains"].density.compile(&scope).expect("valid");
         assert_eq!(density.at(2.0, 0.0), 5e3);
         assert_eq!(scene.mesh.lines_x.len(), 1);
     }
@@ -323,82 +296,35 @@ mod tests {
     fn sets_a_part_of_gravity_that_is_not_given() {
         let source = SceneSource::new("s.toml", "schema = 1\n[time]\nend = 1\n");
         let text = source.with_sets(&["gravity[1]=-5".into()]).expect("valid");
-        assert_eq!(
-            text.text(),
-            "schema = 1\ngravity = [0.0, -5]\n[time]\nend = 1\n"
-        );
+        assert_eq!(text.text(), "schema = 1\ngravity = [0.0, -5]\n[time]\nend = 1\n");
     }
 
     #[test]
     fn says_what_is_wrong() {
         for (text, message, help) in [
-            (
-                "alhpa=1",
-                "there is no parameter `alhpa`",
-                "did you mean `alpha`? parameters are",
-            ),
+            ("alhpa=1", "there is no parameter `alhpa`", "did you mean `alpha`? parameters are"),
             ("alpha", "there is no `=`", "name=value"),
             ("alpha=", "no value after `=`", "name=value"),
             ("=3", "is not a path", "name=value"),
             ("a..b=3", "is not a path", "name=value"),
             ("walls[x].kind=1", "is not a path", "name=value"),
-            (
-                "wals[0].kind=no_slip",
-                "no key `wals`",
-                "did you mean `walls`?",
-            ),
-            (
-                "walls[9].kind=no_slip",
-                "there is no `walls[9]`",
-                "it has 4 elements",
-            ),
-            (
-                "materials.grain.density=3",
-                "no `grain` in materials",
-                "did you mean `grains`?",
-            ),
-            (
-                "parameters.alhpa.value=3",
-                "no `alhpa` in parameters",
-                "did you mean `alpha`?",
-            ),
-            (
-                "accuracy.cells.x=3",
-                "`accuracy.cells` is not a table but: integer",
-                "",
-            ),
+            ("wals[0].kind=no_slip", "no key `wals`", "did you mean `walls`?"),
+            ("walls[9].kind=no_slip", "there is no `walls[9]`", "it has 4 elements"),
+            ("materials.grain.density=3", "no `grain` in materials", "did you mean `grains`?"),
+            ("parameters.alhpa.value=3", "no `alhpa` in parameters", "did you mean `alpha`?"),
+            ("accuracy.cells.x=3", "`accuracy.cells` is not a table but: integer", ""),
             ("name[0]=3", "`name` is not a list but: string", ""),
             ("domain=3", "`domain` is a table", "name one of the keys"),
             ("blocks[0].kind=no_slip", "no list `blocks`", "add it"),
         ] {
             let error = set(&[text]).expect_err(text);
-            assert!(
-                error.message().contains(message),
-                "{text}: {}",
-                error.one_line()
-            );
+            assert!(error.message().contains(message), "{text}: {}", error.one_line());
             assert!(error.message().starts_with(&format!("--set {text}")));
-            assert!(
-                error.remedy().is_none_or(|h| h.contains(help)),
-                "{}",
-                error.one_line()
-            );
+            assert!(error.remedy().is_none_or(|h| h.contains(help)), "{}", error.one_line());
         }
-        assert_eq!(
-            set(&["b=1", "c=1", "alpha=1"])
-                .expect_err("two")
-                .lines()
-                .len(),
-            2
-        );
-        let typo = set(&["accuracy.cels=3"])
-            .and_then(|s| parse(&s))
-            .expect_err("unknown");
-        assert!(
-            typo.one_line().contains("did you mean `cells`?"),
-            "{}",
-            typo.one_line()
-        );
+        assert_eq!(set(&["b=1", "c=1", "alpha=1"]).expect_err("two").lines().len(), 2);
+        let typo = set(&["accuracy.cels=3"]).and_then(|s| parse(&s)).expect_err("unknown");
+        assert!(typo.one_line().contains("did you mean `cells`?"), "{}", typo.one_line());
     }
 
     #[test]
@@ -406,10 +332,7 @@ mod tests {
         let schema: serde_json::Value =
             serde_json::from_str(&crate::scene::json_schema()).expect("valid");
         let properties = schema["properties"].as_object().expect("an object");
-        assert_eq!(
-            properties.keys().map(String::as_str).collect::<Vec<_>>(),
-            KEYS
-        );
+        assert_eq!(properties.keys().map(String::as_str).collect::<Vec<_>>(), KEYS);
     }
 
     #[test]
@@ -417,14 +340,9 @@ mod tests {
         let deep = format!("alpha={}", "[".repeat(100_000));
         let long = format!("{}=1", "a.".repeat(10_000) + "a");
         let boundary = format!("boundaries.{}=1", "a.".repeat(10_000) + "a");
-        for text in [
-            &*deep,
-            &long,
-            &boundary,
-            "gravity[99999999999999999999]=1",
-            "\"a=1",
-            "gravity[-1]=1",
-        ] {
+        for text in
+            [&*deep, &long, &boundary, "gravity[99999999999999999999]=1", "\"a=1", "gravity[-1]=1"]
+        {
             if let Ok(source) = set(&[text]) {
                 assert!(parse(&source).and_then(|scene| Scope::new(&scene)).is_err());
             }

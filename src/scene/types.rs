@@ -481,12 +481,7 @@ pub struct Change {
 
 impl Default for Mesh {
     fn default() -> Self {
-        Mesh {
-            grading: vec![],
-            growth: growth_default(),
-            lines_x: vec![],
-            lines_y: vec![],
-        }
+        Mesh { grading: vec![], growth: growth_default(), lines_x: vec![], lines_y: vec![] }
     }
 }
 

@@ -38,10 +38,8 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
         for (p, angle) in places.into_iter().zip(angles) {
             let si = plan.si(p);
             let region = plan.regions.iter().rev().find(|r| r.shape.contains(si));
-            let material = region
-                .map(|r| r.material)
-                .or(background)
-                .ok_or(Unfilled { x: si[0], y: si[1] })?;
+            let material =
+                region.map(|r| r.material).or(background).ok_or(Unfilled { x: si[0], y: si[1] })?;
             out.push(p, volume, material);
             let last = out.len() - 1;
             let fields = &plan.initial[material as usize];
@@ -89,6 +87,7 @@ fn is_near(mark: &Mark, p: [f64; 2]) -> bool {
     let d = [mark.to[0] - mark.from[0], mark.to[1] - mark.from[1]];
     let length2 = d[0] * d[0] + d[1] * d[1];
     let r = [p[0] - mark.from[0], p[1] - mark.from[1]];
-    let t = if length2 > 0.0 { ((r[0] * d[0] + r[1] * d[1]) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    let t =
+        if length2 > 0.0 { ((r[0] * d[0] + r[1] * d[1]) / length2).clamp(0.0, 1.0) } else { 0.0 };
     (r[0] - t * d[0]).hypot(r[1] - t * d[1]) <= mark.half_width
 }

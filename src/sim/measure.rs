@@ -1,8 +1,8 @@
 //! Diagnostics of a state.
 
+use super::Simulation;
 use super::clock::{Limiter, Speeds};
 use super::row::{GaugeRow, Phases, Row};
-use super::Simulation;
 use crate::plan::Plan;
 use crate::plan::material::Material;
 use crate::solve::element::{PointShape, Rates};
@@ -109,7 +109,8 @@ impl<const D: usize> Simulation<D> {
     /// Of the particles in gravity, less what the background would have in their place.
     fn potential_energy(&self) -> f64 {
         let p = &self.particles;
-        let ground = self.plan.background().map_or(0.0, |b| self.matter.materials[b as usize].density);
+        let ground =
+            self.plan.background().map_or(0.0, |b| self.matter.materials[b as usize].density);
         let g = self.matter.gravity;
         (0..p.len())
             .map(|k| {
@@ -176,10 +177,7 @@ impl<const D: usize> Simulation<D> {
         };
         let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
         let work = trapezoid(before.work, self.last_other_power, other);
-        let larger = power_in
-            .abs()
-            .max(dissipation.abs())
-            .max(REST * r.load_scale * u.power());
+        let larger = power_in.abs().max(dissipation.abs()).max(REST * r.load_scale * u.power());
         let drift = self
             .projected_volumes()
             .iter()

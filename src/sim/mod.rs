@@ -169,11 +169,7 @@ impl<const D: usize> Simulation<D> {
             add_body_force(&mesh, &plan.units, f, &mut fixed_load);
         }
         let mut sim = Simulation {
-            quadrature: Quadrature::new(
-                &mesh,
-                plan.method.quadrature,
-                plan.state.materials.len(),
-            ),
+            quadrature: Quadrature::new(&mesh, plan.method.quadrature, plan.state.materials.len()),
             flow: Flow::zero(&mesh),
             previous: None,
             load: fixed_load.clone(),
@@ -229,8 +225,7 @@ impl<const D: usize> Simulation<D> {
         let plan = self.plan.clone();
         let compliant: Vec<bool> =
             self.matter.materials.iter().map(|m| m.compliance > 0.0).collect();
-        let carrier =
-            Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &half, dt };
+        let carrier = Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &half, dt };
         advect::advance(
             &carrier,
             &mut self.particles,
@@ -293,7 +288,9 @@ impl<const D: usize> Simulation<D> {
                     .collect();
                 Ok((half, 0))
             }
-            (Integrator::Extrapolated | Integrator::Midpoint, _) => self.solve_half_step(dt, now, seconds),
+            (Integrator::Extrapolated | Integrator::Midpoint, _) => {
+                self.solve_half_step(dt, now, seconds)
+            }
         }
     }
 
@@ -308,12 +305,8 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let mut ahead = self.particles.clone();
         let compliant = vec![false; self.matter.materials.len()];
-        let carrier = Carrier {
-            mesh: &plan.mesh,
-            enclosure: &plan.enclosure,
-            velocity: &now,
-            dt: 0.5 * dt,
-        };
+        let carrier =
+            Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &now, dt: 0.5 * dt };
         let mut ignored = Count::default();
         advect::advance(&carrier, &mut ahead, &plan.effects, &compliant, &mut [], &mut ignored);
         ahead.sort(&plan.mesh);
@@ -357,24 +350,20 @@ impl<const D: usize> Simulation<D> {
         self.quadrature
             .update(&plan.mesh, &self.particles, &self.matter.materials, self.version)
             .map_err(|mut source| {
-                source.x *= plan.units.length;
-                source.y *= plan.units.length;
-                SimError::Empty { step, time, source }
-            })?;
+            source.x *= plan.units.length;
+            source.y *= plan.units.length;
+            SimError::Empty { step, time, source }
+        })?;
         self.update_load();
         seconds.quadrature += phase.elapsed().as_secs_f64();
         let stopping = Stopping {
             tolerance: plan.method.tolerance,
             max_corrections: plan.method.max_corrections,
         };
-        self.report = self
-            .stokes
-            .solve(&self.quadrature, &self.load, stopping, &mut self.flow)
-            .map_err(|source| SimError::Solve {
-                step,
-                time,
-                source: source.scaled(plan.units.length),
-            })?;
+        self.report =
+            self.stokes.solve(&self.quadrature, &self.load, stopping, &mut self.flow).map_err(
+                |source| SimError::Solve { step, time, source: source.scaled(plan.units.length) },
+            )?;
         seconds.assemble += self.report.seconds.assemble;
         seconds.factor += self.report.seconds.factor;
         seconds.solve += self.report.seconds.solve;

@@ -42,9 +42,7 @@ impl Raster {
     }
 
     fn index(&self, p: [f64; 2]) -> usize {
-        let at = |c: usize| {
-            (((p[c] - self.origin[c]) / self.step[c]) as usize).min(self.n[c] - 1)
-        };
+        let at = |c: usize| (((p[c] - self.origin[c]) / self.step[c]) as usize).min(self.n[c] - 1);
         at(1) * self.n[0] + at(0)
     }
 
@@ -140,11 +138,8 @@ impl<const D: usize> Simulation<D> {
                 ColourBy::Rotation => f64::NAN,
                 ColourBy::Pressure => self.flow.pressure_at(mesh, x) * u.stress(),
                 ColourBy::StrainRate => {
-                    let l = gradient(
-                        &nodal.map(|v| [v[0], v[1]]),
-                        &Shape::at(r),
-                        mesh.cell_size(cell),
-                    );
+                    let l =
+                        gradient(&nodal.map(|v| [v[0], v[1]]), &Shape::at(r), mesh.cell_size(cell));
                     let d = (l + l.transpose()) * 0.5;
                     (2.0 * d.norm_squared()).sqrt() * u.rate()
                 }
@@ -296,7 +291,8 @@ impl Coarse {
             .map(|k| {
                 let p = fine.centre(k);
                 let place = |c: usize| {
-                    let t = ((p[c] - r.origin[c]) / r.step[c] - 0.5).clamp(0.0, (r.n[c] - 1) as f64);
+                    let t =
+                        ((p[c] - r.origin[c]) / r.step[c] - 0.5).clamp(0.0, (r.n[c] - 1) as f64);
                     let i = (t as usize).min(r.n[c].saturating_sub(2));
                     (i, t - i as f64)
                 };
@@ -313,10 +309,7 @@ impl Coarse {
 /// Lines of one level through the centres of a field's cells (marching squares).
 fn isoline(f: &GridField, level: f32) -> Isoline {
     let point = |i: usize, j: usize| {
-        [
-            f.origin[0] + (i as f32 + 0.5) * f.cell[0],
-            f.origin[1] + (j as f32 + 0.5) * f.cell[1],
-        ]
+        [f.origin[0] + (i as f32 + 0.5) * f.cell[0], f.origin[1] + (j as f32 + 0.5) * f.cell[1]]
     };
     let value = |i: usize, j: usize| f.values[j * f.nx + i];
     let mut strips = Vec::new();

@@ -107,12 +107,7 @@ pub fn add_internal_force<const D: usize>(
 }
 
 /// Adds the stiffness of a point of volume `volume` to the element matrix (both triangles).
-pub fn add_stiffness<const D: usize>(
-    k: &mut Matrix,
-    s: &PointShape,
-    law: &PointLaw,
-    volume: f64,
-) {
+pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &PointLaw, volume: f64) {
     let (sa, sb, sc) = (volume * law.shear.a, volume * law.shear.b, volume * law.shear.c);
     let beta = volume * law.dilation;
     let spin = if D == 3 { 4.0 * volume * law.coupling } else { 0.0 };
@@ -170,7 +165,10 @@ static REFERENCE_DIVERGENCE: LazyLock<Divergence> = LazyLock::new(|| {
 impl Divergence {
     pub fn new([hx, hy]: [f64; 2]) -> Self {
         let r = &*REFERENCE_DIVERGENCE;
-        Divergence { x: r.x.map(|row| row.map(|v| v * 2.0 * hy)), y: r.y.map(|row| row.map(|v| v * 2.0 * hx)) }
+        Divergence {
+            x: r.x.map(|row| row.map(|v| v * 2.0 * hy)),
+            y: r.y.map(|row| row.map(|v| v * 2.0 * hx)),
+        }
     }
 
     /// `B u`

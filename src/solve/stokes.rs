@@ -316,12 +316,7 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    fn residual(
-        &self,
-        quadrature: &Quadrature,
-        load: &[[f64; D]],
-        flow: &Flow<D>,
-    ) -> Residual<D> {
+    fn residual(&self, quadrature: &Quadrature, load: &[[f64; D]], flow: &Flow<D>) -> Residual<D> {
         let mut out = Residual {
             force: load.to_vec(),
             divergence: vec![[0.0; 3]; self.mesh.cells()],

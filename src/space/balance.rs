@@ -55,9 +55,10 @@ pub fn open_faces(mesh: &Mesh, enclosure: &Enclosure) -> Vec<Face> {
             let other = if normal == 0 { mesh.cell(next, j) } else { mesh.cell(i, next) };
             let at = axis.lines()[k + 1];
             let middle = mesh.cell_centre(cell)[1 - normal];
-            let walled = enclosure.obstacles.iter().any(|o| {
-                o.normal == normal && o.at == at && middle > o.from && middle < o.to
-            });
+            let walled = enclosure
+                .obstacles
+                .iter()
+                .any(|o| o.normal == normal && o.at == at && middle > o.from && middle < o.to);
             if !walled && !mesh.solid[other] {
                 faces.push(Face { cells: [cell as u32, other as u32], normal, at, middle });
             }
@@ -108,8 +109,7 @@ impl Balance {
             let total: f64 = self.before[cell * n..][..n].iter().sum();
             // A cell without particles is full of background, and takes no part.
             let empty = particles.of_cell(cell).is_empty();
-            self.excess[cell] =
-                if empty { f64::NAN } else { total / mesh.cell_area(cell) - 1.0 };
+            self.excess[cell] = if empty { f64::NAN } else { total / mesh.cell_area(cell) - 1.0 };
         }
         // All fluxes from the state before: no direction is favoured.
         for face in &self.faces {

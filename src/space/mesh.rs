@@ -93,7 +93,11 @@ impl Axis {
     /// Index of the mesh line nearest to a coordinate.
     pub fn nearest_line(&self, x: f64) -> usize {
         let after = self.lines.partition_point(|&l| l < x).min(self.lines.len() - 1);
-        if after > 0 && x - self.lines[after - 1] < self.lines[after] - x { after - 1 } else { after }
+        if after > 0 && x - self.lines[after - 1] < self.lines[after] - x {
+            after - 1
+        } else {
+            after
+        }
     }
 }
 
@@ -176,12 +180,14 @@ impl Mesh {
             (false, true) => Some(axis.cells() - 1),
             _ => None,
         };
-        [false, true].into_iter().flat_map(move |up| {
-            [
-                step(&self.x, i, up).map(|i| self.cell(i, j)),
-                step(&self.y, j, up).map(|j| self.cell(i, j)),
-            ]
-        })
-        .flatten()
+        [false, true]
+            .into_iter()
+            .flat_map(move |up| {
+                [
+                    step(&self.x, i, up).map(|i| self.cell(i, j)),
+                    step(&self.y, j, up).map(|j| self.cell(i, j)),
+                ]
+            })
+            .flatten()
     }
 }

@@ -231,9 +231,8 @@ mod tests {
             }
             total
         };
-        let lines: Vec<u32> = (0..mesh.nodes() as u32)
-            .filter(|&n| s.position[n as usize] != u32::MAX)
-            .collect();
+        let lines: Vec<u32> =
+            (0..mesh.nodes() as u32).filter(|&n| s.position[n as usize] != u32::MAX).collect();
         let (cp, r) = pattern(&mesh, &lines);
         assert!(2 * fill(&s.col_ptr, &s.rows) < fill(&cp, &r));
     }

@@ -140,7 +140,8 @@ fn nearest(
         let r = mesh.to_reference(cell, particles.position[p]);
         (r[0] - place[0]).powi(2) + (r[1] - place[1]).powi(2)
     };
-    let by_volume = |a: &&usize, b: &&usize| particles.volume[**a].total_cmp(&particles.volume[**b]);
+    let by_volume =
+        |a: &&usize, b: &&usize| particles.volume[**a].total_cmp(&particles.volume[**b]);
     members
         .iter()
         .filter(|&&p| particles.volume[p] >= least_volume)

@@ -106,8 +106,7 @@ mod tests {
             let five: f64 = GAUSS_5.iter().map(|(x, w)| w * x.powi(degree)).sum();
             assert!((five - exact).abs() < 1e-14, "degree {degree}");
             if degree <= 5 {
-                let three: f64 =
-                    GAUSS_3X3.iter().map(|g| g.weight * g.r[0].powi(degree)).sum();
+                let three: f64 = GAUSS_3X3.iter().map(|g| g.weight * g.r[0].powi(degree)).sum();
                 assert!((three - exact).abs() < 1e-14, "degree {degree}");
             }
         }

@@ -143,9 +143,8 @@ fn the_layer_follows_the_one_dimensional_solution() {
                 (0..20).map(|k| run.velocity_at([-0.25 + 0.025 * k as f64, y])[2] / 20.0).sum();
             assert!((mean / w[i] - 1.0).abs() < 0.01, "t = {target}, y = {y}: {mean} {}", w[i]);
             let (a, b) = (measured_alignment(run, y), {
-                let near = (i - 25..i + 25).map(|j| {
-                    alignment(0.5 * (layer.shear[j] + layer.shear[j + 1]))
-                });
+                let near = (i - 25..i + 25)
+                    .map(|j| alignment(0.5 * (layer.shear[j] + layer.shear[j + 1])));
                 near.sum::<f64>() / 50.0
             });
             assert!((a - b).abs() < 0.01, "t = {target}, y = {y}: |n_x| {a} {b}");

@@ -52,7 +52,8 @@ fn every_step_balances_power_and_divergence() {
 
 #[test]
 fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
-    let mut run = preset("silo", &["accuracy.cells=6", "alpha=1/3", "time.end=1.4e-3", "recording.times=[]"]);
+    let mut run =
+        preset("silo", &["accuracy.cells=6", "alpha=1/3", "time.end=1.4e-3", "recording.times=[]"]);
     let first = run.row().potential_energy;
     let mut from_rate = 0.0;
     let mut before = (0.0, run.row().gauges[0].rate);
@@ -68,7 +69,10 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
     assert!(run.row().drift[0].abs() < 2e-3, "drift {}", run.row().drift[0]);
     let row = run.row();
     let volume = row.gauges[0].volume;
-    println!("outflow {volume} from rate {from_rate}, energy {:e}", energy_error(run.as_ref(), first));
+    println!(
+        "outflow {volume} from rate {from_rate}, energy {:e}",
+        energy_error(run.as_ref(), first)
+    );
     assert!((volume / from_rate - 1.0).abs() < 5e-3, "{volume} {from_rate}");
     assert!(energy_error(run.as_ref(), first).abs() < 0.01);
     // Particles stay inside, and their volumes add up to the grains'.
@@ -95,7 +99,8 @@ fn a_symmetric_silo_stays_symmetric() {
 
 /// A drop with directors and Cosserat rotation falling beside a wall; `turned` by 90 degrees.
 fn drop(turned: bool) -> Box<dyn Run> {
-    let swap = |a: &str, b: &str| if turned { format!("[{b}, {a}]") } else { format!("[{a}, {b}]") };
+    let swap =
+        |a: &str, b: &str| if turned { format!("[{b}, {a}]") } else { format!("[{a}, {b}]") };
     // (x, y) -> (-y, x)
     let (domain_x, domain_y) =
         if turned { ("[-1.5, 0]", "[0, 1]") } else { ("[0, 1]", "[0, 1.5]") };
@@ -131,7 +136,10 @@ fn a_turned_scene_gives_the_turned_result() {
             let (p, q) = (a.velocity_at([x, y]), b.velocity_at([-y, x]));
             let turned = [-p[1], p[0], p[2]];
             for c in 0..3 {
-                assert!((turned[c] - q[c]).abs() < 1e-6 * scale.max(1.0), "step {step}: {turned:?} {q:?}");
+                assert!(
+                    (turned[c] - q[c]).abs() < 1e-6 * scale.max(1.0),
+                    "step {step}: {turned:?} {q:?}"
+                );
             }
         }
         a.step().unwrap();

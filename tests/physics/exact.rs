@@ -9,11 +9,8 @@ fn check_rates(case: &Case, coarse: u32) {
     let a = case.errors(coarse, &[]).unwrap();
     let b = case.errors(2 * coarse, &[]).unwrap();
     let rate = |a: f64, b: f64| (a / b).log2();
-    let observed = [
-        rate(a.velocity, b.velocity),
-        rate(a.rotation, b.rotation),
-        rate(a.pressure, b.pressure),
-    ];
+    let observed =
+        [rate(a.velocity, b.velocity), rate(a.rotation, b.rotation), rate(a.pressure, b.pressure)];
     println!("{}: {a:?} -> {b:?}, rates {observed:.2?}", case.name);
     assert!(observed[0] >= case.rates.velocity, "{} velocity: {observed:?}", case.name);
     if let Some(expected) = case.rates.rotation {

@@ -19,7 +19,8 @@ fn laws() -> Vec<Box<dyn Fn(f64) -> Matrix4<f64>>> {
     ];
     for a in ANGLES {
         list.push(Box::new(move |turn| {
-            cosserat::viscosity(ETA, 300.0, 2.0 * ETA) + layered::correction(ETA, 1.0, &unit(a + turn))
+            cosserat::viscosity(ETA, 300.0, 2.0 * ETA)
+                + layered::correction(ETA, 1.0, &unit(a + turn))
         }));
     }
     list

@@ -16,8 +16,7 @@ pub fn start(source: SceneSource, sets: &[&str]) -> Box<dyn Run> {
     let sets: Vec<String> = sets.iter().map(|s| s.to_string()).collect();
     let source = source.with_sets(&sets).unwrap_or_else(|e| panic!("{:?}", e.lines()));
     let scene = parse(&source).unwrap_or_else(|e| panic!("{:?}", e.lines()));
-    let plan =
-        resolve(&scene).unwrap_or_else(|e| panic!("{:?}", e.with_source(&source).lines()));
+    let plan = resolve(&scene).unwrap_or_else(|e| panic!("{:?}", e.with_source(&source).lines()));
     sim::start(Arc::new(plan)).unwrap_or_else(|e| panic!("{e}"))
 }
 

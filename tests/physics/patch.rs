@@ -18,7 +18,8 @@ fn patch(boundaries: &str, extra: &str) -> String {
 
 const COSSERAT: &str = "[materials.a]\nshear_viscosity = 2.5\ncoupling_viscosity = 1.5\ninternal_length = 0.4\n\
                         [materials.b]\nshear_viscosity = 2.5\ncoupling_viscosity = 1.5\ninternal_length = 0.4\n";
-const CLASSICAL: &str = "[materials.a]\nshear_viscosity = 2.5\n[materials.b]\nshear_viscosity = 2.5\n";
+const CLASSICAL: &str =
+    "[materials.a]\nshear_viscosity = 2.5\n[materials.b]\nshear_viscosity = 2.5\n";
 const COMPRESSIBLE: &str = "[materials.a]\nshear_viscosity = 2.5\nbulk_viscosity = 4\n\
                             [materials.b]\nshear_viscosity = 2.5\nbulk_viscosity = 4\n";
 
@@ -36,7 +37,8 @@ fn linear(l: [[f64; 2]; 2], materials: &str) {
     let spin = 0.5 * (l[1][0] - l[0][1]);
     let cosserat = run.plan().effects.rotation;
     for k in 0..60 {
-        let p = [0.013 + 1.28 * ((k as f64 * 0.618) % 1.0), -0.19 + 0.88 * ((k as f64 * 0.37) % 1.0)];
+        let p =
+            [0.013 + 1.28 * ((k as f64 * 0.618) % 1.0), -0.19 + 0.88 * ((k as f64 * 0.37) % 1.0)];
         let [u, v, w] = run.velocity_at(p);
         assert!((u - l[0][0] * p[0] - l[0][1] * p[1]).abs() < TOLERANCE, "{p:?}: {u}");
         assert!((v - l[1][0] * p[0] - l[1][1] * p[1]).abs() < TOLERANCE, "{p:?}: {v}");
@@ -69,7 +71,13 @@ fn constant_density_moves_nothing() {
     let text = patch("", "");
     // Gravity is a top-level key: it goes before the tables.
     let text = text.replacen("name = \"patch\"\n", "name = \"patch\"\ngravity = [3, -10]\n", 1);
-    let text = text.replace("[[regions]]\nmaterial = \"a\"", &format!("{}[[regions]]\nmaterial = \"a\"", materials.replacen("gravity = [3, -10]\n", "", 1)));
+    let text = text.replace(
+        "[[regions]]\nmaterial = \"a\"",
+        &format!(
+            "{}[[regions]]\nmaterial = \"a\"",
+            materials.replacen("gravity = [3, -10]\n", "", 1)
+        ),
+    );
     let run = scene(&text, &[]);
     let speed = run.row().max_speed;
     assert!(speed < 1e-12 * 7.0 * 10.0 / 2.5, "{speed}");

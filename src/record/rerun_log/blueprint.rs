@@ -37,10 +37,7 @@ pub(super) fn send(
     layout.set_log_tick_enabled(false);
     layout.set_time_sequence("blueprint", 0);
 
-    let mut writer = Writer {
-        rec: &layout,
-        count: 0,
-    };
+    let mut writer = Writer { rec: &layout, count: 0 };
     let root = writer.run(info, paths)?;
     layout.log(
         "viewport",
@@ -104,11 +101,9 @@ impl Writer<'_> {
             let left = self.stack(components::ContainerKind::Vertical, &left, &shares)?;
             match plots {
                 None => Ok(left),
-                Some(plots) => self.stack(
-                    components::ContainerKind::Horizontal,
-                    &[left, plots],
-                    &[2.0, 1.0],
-                ),
+                Some(plots) => {
+                    self.stack(components::ContainerKind::Horizontal, &[left, plots], &[2.0, 1.0])
+                }
             }
         } else {
             let mut columns = vec![flow];
@@ -169,8 +164,7 @@ impl Writer<'_> {
         if views.is_empty() {
             return Ok(None);
         }
-        self.stack(components::ContainerKind::Vertical, &views, &[])
-            .map(Some)
+        self.stack(components::ContainerKind::Vertical, &views, &[]).map(Some)
     }
 
     /// A view of a part of space.
@@ -208,12 +202,7 @@ impl Writer<'_> {
             .map(|series| format!("+ {}", paths.curve(&series.path, plot.log10)))
             .collect();
         let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
-        let node = self.view(
-            "TimeSeries",
-            &plot.title,
-            &paths.root.to_string(),
-            &contents,
-        )?;
+        let node = self.view("TimeSeries", &plot.title, &paths.root.to_string(), &contents)?;
         self.property(
             &node,
             "PlotLegend",

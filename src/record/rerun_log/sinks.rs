@@ -63,17 +63,11 @@ pub(super) struct RrdFile {
 
 impl RrdFile {
     pub(super) fn create(path: &Path) -> Result<Self, RecordError> {
-        let failed = |cause: String| RecordError::Write {
-            path: path.to_owned(),
-            cause,
-        };
+        let failed = |cause: String| RecordError::Write { path: path.to_owned(), cause };
         let file = File::create(path).map_err(|e| failed(e.to_string()))?;
-        let encoder = Encoder::new_eager(
-            CrateVersion::LOCAL,
-            EncodingOptions::PROTOBUF_COMPRESSED,
-            file,
-        )
-        .map_err(|e| failed(e.to_string()))?;
+        let encoder =
+            Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, file)
+                .map_err(|e| failed(e.to_string()))?;
         Ok(Self {
             path: path.to_owned(),
             encoder: Arc::new(Mutex::new(encoder)),
@@ -84,38 +78,24 @@ impl RrdFile {
     pub(super) fn check(&self) -> Result<(), RecordError> {
         match lock(&self.fault).clone() {
             None => Ok(()),
-            Some(cause) => Err(RecordError::Write {
-                path: self.path.clone(),
-                cause,
-            }),
+            Some(cause) => Err(RecordError::Write { path: self.path.clone(), cause }),
         }
     }
 
     /// The error of a file that takes no more data, without saying why.
     pub(super) fn late(&self) -> RecordError {
-        RecordError::Write {
-            path: self.path.clone(),
-            cause: "the disk does not answer".to_owned(),
-        }
+        RecordError::Write { path: self.path.clone(), cause: "the disk does not answer".to_owned() }
     }
 
     /// Writes the footer. To be called when nothing more will be sent.
     pub(super) fn finish(&self) -> Result<Saved, RecordError> {
         self.check()?;
-        let failed = |cause: String| RecordError::Write {
-            path: self.path.clone(),
-            cause,
-        };
+        let failed = |cause: String| RecordError::Write { path: self.path.clone(), cause };
         let mut encoder = lock(&self.encoder);
         encoder.finish().map_err(|e| failed(e.to_string()))?;
-        encoder
-            .flush_blocking()
-            .map_err(|e| failed(e.to_string()))?;
+        encoder.flush_blocking().map_err(|e| failed(e.to_string()))?;
         let size = std::fs::metadata(&self.path).map_err(|e| failed(e.to_string()))?;
-        Ok(Saved {
-            path: self.path.clone(),
-            bytes: size.len(),
-        })
+        Ok(Saved { path: self.path.clone(), bytes: size.len() })
     }
 }
 
@@ -157,10 +137,7 @@ impl Live {
     pub(super) fn check(&self) -> Result<(), RecordError> {
         match lock(&self.fault).clone() {
             None => Ok(()),
-            Some(cause) => Err(RecordError::Viewer {
-                name: self.name.clone(),
-                cause,
-            }),
+            Some(cause) => Err(RecordError::Viewer { name: self.name.clone(), cause }),
         }
     }
 }
@@ -217,10 +194,7 @@ impl Destinations {
                     all.sinks.push(Box::new(file));
                 }
                 Sink::Connect(url) => all.connect(url)?,
-                Sink::Serve {
-                    web_port,
-                    grpc_port,
-                } => all.serve(*web_port, *grpc_port)?,
+                Sink::Serve { web_port, grpc_port } => all.serve(*web_port, *grpc_port)?,
                 Sink::Spawn => all.spawn()?,
             }
         }
@@ -229,10 +203,7 @@ impl Destinations {
 
     fn add_viewer(&mut self, name: String, inner: Box<dyn LogSink>) {
         let fault = Fault::default();
-        self.sinks.push(Box::new(LiveSink {
-            fault: Arc::clone(&fault),
-            inner,
-        }));
+        self.sinks.push(Box::new(LiveSink { fault: Arc::clone(&fault), inner }));
         self.viewers.push(Live { name, fault });
     }
 
@@ -251,10 +222,8 @@ impl Destinations {
             wait_for_bind: true,
             ..Default::default()
         };
-        let viewer = rerun::spawn(&options).map_err(|e| RecordError::Viewer {
-            name: "rerun".to_owned(),
-            cause: e.to_string(),
-        })?;
+        let viewer = rerun::spawn(&options)
+            .map_err(|e| RecordError::Viewer { name: "rerun".to_owned(), cause: e.to_string() })?;
         self.connect(&format!("rerun+http://127.0.0.1:{}/proxy", viewer.port))
     }
 

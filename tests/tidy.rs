@@ -1,0 +1,116 @@
+//! The invariants of ARCHITECTURE.md, checked on the sources.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Rooms of the house, ground floor first, and what each may import.
+const ROOMS: [(&str, &[&str]); 11] = [
+    ("laws", &[]),
+    ("frame", &[]),
+    ("scene", &[]),
+    ("space", &["laws", "scene"]),
+    ("plan", &["laws", "scene", "space"]),
+    ("solve", &["laws", "scene", "space", "plan"]),
+    ("motion", &["laws", "space", "plan"]),
+    ("sim", &["laws", "frame", "scene", "space", "plan", "solve", "motion"]),
+    ("cases", &["scene", "space", "plan", "sim"]),
+    ("record", &["frame", "scene", "space", "plan", "sim"]),
+    ("commands", &["frame", "scene", "plan", "sim", "record"]),
+];
+
+fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, out);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+fn all_sources() -> Vec<PathBuf> {
+    let mut list = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut list);
+    list.sort();
+    list
+}
+
+/// First folder (or file) below `src` that a source lies in.
+fn room(path: &Path) -> String {
+    let below = path.strip_prefix(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap();
+    let first = below.components().next().unwrap().as_os_str().to_string_lossy().into_owned();
+    first.trim_end_matches(".rs").to_string()
+}
+
+/// Lines of code outside tests, with their numbers.
+fn code(path: &Path) -> Vec<(usize, String)> {
+    let text = fs::read_to_string(path).unwrap();
+    text.lines()
+        .take_while(|l| !l.starts_with("#[cfg(test)]"))
+        .enumerate()
+        .map(|(n, l)| (n + 1, l.to_string()))
+        .filter(|(_, l)| !l.trim_start().starts_with("//"))
+        .collect()
+}
+
+#[test]
+fn imports_go_one_way() {
+    let mut faults = Vec::new();
+    for path in all_sources() {
+        let room = room(&path);
+        if room == "lib" || room == "main" {
+            continue;
+        }
+        let (_, allowed) = ROOMS
+            .iter()
+            .find(|(name, _)| *name == room)
+            .unwrap_or_else(|| panic!("{room} is not in ARCHITECTURE.md's list of rooms"));
+        for (number, line) in code(&path) {
+            for part in line.split("crate::").skip(1) {
+                let used: String =
+                    part.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                if used != room && !used.is_empty() && !allowed.contains(&used.as_str()) {
+                    faults.push(format!("{}:{number}: {room} imports {used}", path.display()));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn only_the_recorder_names_rerun() {
+    for path in all_sources() {
+        if path.to_string_lossy().contains("record/rerun_log") {
+            continue;
+        }
+        for (number, line) in code(&path) {
+            assert!(!line.contains("rerun::"), "{}:{number} names rerun", path.display());
+        }
+    }
+}
+
+#[test]
+fn nothing_unwraps_or_uses_unsafe_code() {
+    for path in all_sources() {
+        for (number, line) in code(&path) {
+            for word in [".unwrap()", ".expect(", "unsafe ", "todo!", "unimplemented!", "dbg!"] {
+                assert!(!line.contains(word), "{}:{number}: {word}", path.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn every_module_says_what_it_is() {
+    for path in all_sources() {
+        let text = fs::read_to_string(&path).unwrap();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        assert!(
+            text.starts_with("//!") || name == "main.rs",
+            "{} has no module doc",
+            path.display()
+        );
+    }
+}
