@@ -163,6 +163,8 @@ pub struct Material {
     pub name: String,
     /// Its colour (sRGB).
     pub rgb: [u8; 3],
+    /// Its particles are in the pictures: it belongs into the legend.
+    pub drawn: bool,
 }
 
 /// A quantity that is shown by colour.

@@ -1,4 +1,36 @@
-//! grainscope
+//! Look into the flow of grains with microstructure: an implicit Material Point Method for fluids
+//! with an internal length (Cosserat) and an orientation (director).
+//!
+//! The binary `grainscope` is a thin layer over this library. A tour:
+//!
+//! - [`scene`] reads TOML: what is written. [`plan`] decides what will be solved, and why.
+//! - [`sim`] runs it: [`sim::start`] gives a [`sim::Run`], which takes steps and answers questions
+//!   in SI units.
+//! - [`space`], [`solve`], [`motion`] are what a step is made of; [`laws`] are the equations of the
+//!   source, as functions of small matrices.
+//! - [`record`] writes recordings, tables and plots; [`cases`] are scenes with exact solutions.
+//!
+//! ```
+//! use grainscope::{plan, scene, sim};
+//! use std::sync::Arc;
+//!
+//! // A preset, coarser, without internal length: no rotation is solved.
+//! let source = scene::presets::find("silo")?
+//!     .with_sets(&["accuracy.cells=4".into(), "alpha=0".into()])?;
+//! let plan = plan::resolve(&scene::parse(&source)?).map_err(|e| e.with_source(&source))?;
+//! assert!(!plan.effects.rotation);
+//!
+//! let mut run = sim::start(Arc::new(plan))?;
+//! let before = run.row().gauges[0].volume;
+//! run.step()?;
+//! let row = run.row();
+//! assert!(row.gauges[0].volume > before);
+//! assert!(row.power_error < 1e-8);
+//! let [_, v, _] = run.velocity_at([0.0, 3.0]);
+//! assert!(v < 0.0, "the grains fall through the slit");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
 pub mod cases;
 pub mod commands;
 pub mod frame;
@@ -10,3 +42,5 @@ pub mod scene;
 pub mod sim;
 pub mod solve;
 pub mod space;
+#[doc(hidden)]
+pub mod testing;

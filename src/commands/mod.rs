@@ -124,6 +124,14 @@ impl Failure {
 
     fn print(self) {
         match self {
+            // Without a place in the text the drawing would not name the file.
+            Failure::Scene(e) if e.span().is_none() => {
+                eprintln!("error: {}", e.headline());
+                if let Some(help) = e.remedy() {
+                    eprintln!("  help: {help}");
+                }
+                e.others().iter().flat_map(SceneError::lines).for_each(|l| eprintln!("error: {l}"));
+            }
             Failure::Scene(e) => eprintln!("{:?}", miette::Report::new(*e)),
             Failure::Sim(e) => eprintln!("error: {e}\n  help: {}", e.remedy()),
             Failure::Environment(text) | Failure::Usage(text) => eprintln!("error: {text}"),

@@ -156,11 +156,6 @@ impl Session {
         let cannot = |path: &Path, e: std::io::Error| {
             Failure::Environment(format!("cannot write {}: {e}", path.display()))
         };
-        let scene_file = folder.join("scene.toml");
-        std::fs::write(&scene_file, to_toml(&plan.scene)).map_err(|e| cannot(&scene_file, e))?;
-        let series_file = folder.join("series.csv");
-        let series =
-            SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
         let recording = (!args.no_recording)
             .then(|| args.save.clone().unwrap_or_else(|| folder.join("recording.rrd")));
         let mut sinks: Vec<Sink> = recording.iter().cloned().map(Sink::Save).collect();
@@ -182,7 +177,8 @@ impl Session {
         let logger = if sinks.is_empty() {
             None
         } else {
-            let log = RerunLog::open(&info::run_info(plan, &name), &sinks)?;
+            let log = RerunLog::open(&info::run_info(plan, &name), &sinks)
+                .inspect_err(|_| folder::abandon(&folder))?;
             if let Some(url) = log.url() {
                 eprintln!("viewer: {url}");
             }
@@ -192,6 +188,11 @@ impl Session {
                 Failure::Environment(format!("the logger thread cannot be started: {e}"))
             })?)
         };
+        let scene_file = folder.join("scene.toml");
+        std::fs::write(&scene_file, to_toml(&plan.scene)).map_err(|e| cannot(&scene_file, e))?;
+        let series_file = folder.join("series.csv");
+        let series =
+            SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
         let tally = Tally {
             phases: Phases::default(),
             wall: 0.0,
@@ -295,8 +296,7 @@ impl Session {
             }
             let picture = due.then(|| self.run.picture());
             let wall = self.clock.elapsed().as_secs_f64();
-            let alignment = picture.is_some().then(|| self.run.mean_alignment()).flatten();
-            let frame: Frame = info::frame(&self.plan, &row, wall, alignment, picture, notes);
+            let frame: Frame = info::frame(&self.plan, &row, wall, picture, notes);
             if logger.send(frame).is_err() {
                 return Err(Failure::Environment("the recording ended early".into()));
             }
@@ -399,6 +399,17 @@ impl Session {
                         curves: of(&|r, k| r.gauges[k].rate),
                     },
                 ],
+            )?;
+        }
+        if self.plan.effects.directors {
+            line_plot(
+                &self.folder.join("alignment"),
+                &PlotSpec {
+                    title: format!("{title}: alignment of the directors"),
+                    x: time(),
+                    y: Axis::new("mean |n_x|", ""),
+                    curves: vec![curve("mean |n_x|", &|r| r.alignment.unwrap_or(f64::NAN))],
+                },
             )?;
         }
         line_plot(

@@ -12,7 +12,7 @@ pub enum FolderError {
 }
 
 /// Files that a run writes; `--force` removes these and nothing else.
-pub const FILES: [&str; 9] = [
+pub const FILES: [&str; 10] = [
     "recording.rrd",
     "series.csv",
     "summary.json",
@@ -22,6 +22,7 @@ pub const FILES: [&str; 9] = [
     "diagnostics.svg",
     "diagnostics.png",
     "alignment.svg",
+    "alignment.png",
 ];
 
 /// Most numbered siblings tried before giving up.
@@ -44,6 +45,13 @@ pub fn create(name: &str, out: Option<&Path>, force: bool) -> Result<PathBuf, Fo
         }
     }
     Err(FolderError::Taken(wanted))
+}
+
+/// Takes back what a run that could not start has left: a recording, and the folder if empty.
+pub fn abandon(folder: &Path) {
+    // Best effort: the fault that is being reported matters more.
+    let _ = std::fs::remove_file(folder.join("recording.rrd"));
+    let _ = std::fs::remove_dir(folder);
 }
 
 fn holds_run(folder: &Path) -> bool {

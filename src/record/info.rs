@@ -44,19 +44,16 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
             .zip(names)
             .map(|(o, name)| Outline { name, points: segment(o.normal, o.at, o.from, o.to) }),
     );
-    let mut materials: Vec<Material> = plan
+    let undrawn = plan.background().map(|b| &plan.state.materials[b as usize].name);
+    let materials: Vec<Material> = plan
         .state
         .materials
         .iter()
         .map(|m| m.name.clone())
         .chain((!plan.marks.is_empty()).then(|| MARKED.to_string()))
         .zip(&plan.picture.colours)
-        .map(|(name, &rgb)| Material { name, rgb })
+        .map(|(name, &rgb)| Material { drawn: Some(&name) != undrawn, name, rgb })
         .collect();
-    if plan.background().is_some() && plan.marks.is_empty() && materials.len() == 2 {
-        // The background is not drawn: a legend of one material says nothing.
-        materials.retain(|m| plan.state.materials.iter().any(|p| p.name == m.name));
-    }
     let side = plan.method.seeding.side as f64;
     let sizes = |a: &crate::space::mesh::Axis| a.length() / a.cells() as f64;
     let hash = scene_hash(&plan.scene);
@@ -168,7 +165,6 @@ pub fn frame(
     plan: &Plan,
     row: &Row,
     wall_s: f64,
-    alignment: Option<f64>,
     picture: Option<Picture>,
     warnings: Vec<String>,
 ) -> Frame {
@@ -184,7 +180,7 @@ pub fn frame(
         scalars.push(Scalar::new(format!("gauges/{}/rate", plan.name), g.rate));
     }
     scalars.extend(row.seconds.list().map(|(name, s)| Scalar::new(format!("seconds/{name}"), s)));
-    scalars.extend(alignment.map(|a| Scalar::new("texture/alignment", a)));
+    scalars.extend(row.alignment.map(|a| Scalar::new("texture/alignment", a)));
     if row.step > 0 {
         scalars.push(Scalar::new("time/dt", row.dt));
     }

@@ -573,7 +573,7 @@ mod tests {
 
     #[test]
     fn strange_data_is_drawn_all_the_same() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
+        let folder = crate::testing::TempFolder::new().expect("a temporary folder");
         let curves: [&[(f64, f64)]; 6] = [
             &[],
             &[(0.0, 0.0)],

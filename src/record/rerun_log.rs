@@ -242,9 +242,10 @@ impl RerunLog {
         log.world(info)?;
         log.texts(info)?;
         log.curves(info)?;
+        // A viewer that is absent from the start is a mistake in the command; the check forgets it.
+        let wanted = log.viewers.clone();
         log.check()?;
-        // A viewer that is absent from the start is a mistake in the command.
-        log.viewers.iter().try_for_each(Live::check)?;
+        wanted.iter().try_for_each(Live::check)?;
         Ok(log)
     }
 
@@ -371,9 +372,10 @@ impl RerunLog {
             self.names("world/gauges/names", named)?;
         }
         // One material needs no legend, and a colour bar stands in its place.
-        if info.particle_quantity.is_none() && info.materials.len() > 1 {
-            let materials = info.materials.iter();
-            let row = bar::row(info.domain, info.materials.len());
+        let materials: Vec<_> = info.materials.iter().filter(|material| material.drawn).collect();
+        if info.particle_quantity.is_none() && materials.len() > 1 {
+            let row = bar::row(info.domain, materials.len());
+            let materials = materials.into_iter();
             self.rec.log_static(
                 self.paths.at("world/materials"),
                 &archetypes::Points2D::new(row.clone())

@@ -48,6 +48,9 @@ pub fn columns(plan: &Plan) -> Vec<String> {
         ]
         .map(String::from),
     );
+    if plan.effects.directors {
+        list.push("mean_alignment".into());
+    }
     list.extend(plan.state.materials.iter().map(|m| format!("{}.volume_drift", m.name)));
     list
 }
@@ -91,6 +94,9 @@ impl SeriesWriter {
             row.merges,
             row.held
         );
+        if let Some(a) = row.alignment {
+            line += &format!(",{a}");
+        }
         for d in &row.drift {
             line += &format!(",{d:e}");
         }

@@ -146,20 +146,16 @@ impl SceneError {
         &self.related
     }
 
+    /// `file:line:column: message`, as far as they are known.
+    pub fn headline(&self) -> String {
+        let place = self.place.as_deref().map_or(String::new(), |place| format!("{place}: "));
+        format!("{place}{}", self.message).replace('\n', " ")
+    }
+
     /// `file:line:column: message (help)`, without the related errors.
     pub fn one_line(&self) -> String {
-        let mut line = String::new();
-        if let Some(place) = &self.place {
-            line.push_str(place);
-            line.push_str(": ");
-        }
-        line.push_str(&self.message);
-        if let Some(help) = &self.help {
-            line.push_str(" (");
-            line.push_str(help);
-            line.push(')');
-        }
-        line.replace('\n', " ")
+        let help = self.help.as_deref().map_or(String::new(), |help| format!(" ({help})"));
+        format!("{}{help}", self.headline()).replace('\n', " ")
     }
 
     /// This error and the related ones, one line each.

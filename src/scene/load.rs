@@ -446,7 +446,7 @@ mod tests {
 
     #[test]
     fn refuses_what_is_no_scene_file() {
-        let folder = tempfile::tempdir().expect("temporary folder");
+        let folder = crate::testing::TempFolder::new().expect("temporary folder");
         let file = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
             fs::write(&path, bytes).expect("writes");

@@ -34,6 +34,7 @@ pub fn empty_row(plan: &Plan) -> Row {
         work: 0.0,
         dissipated: 0.0,
         director_error: 0.0,
+        alignment: None,
         active_rotation: 0,
         splits: 0,
         merges: 0,
@@ -62,7 +63,7 @@ pub fn hash(p: &Particles) -> String {
 }
 
 /// Volume mean of |n_x| over layered particles.
-pub fn mean_alignment(p: &Particles, materials: &[Material]) -> Option<f64> {
+fn mean_alignment(p: &Particles, materials: &[Material]) -> Option<f64> {
     let directors = p.director.as_ref()?;
     let (mut sum, mut volume) = (0.0, 0.0);
     for (k, n) in directors.iter().enumerate() {
@@ -218,6 +219,7 @@ impl<const D: usize> Simulation<D> {
             work,
             dissipated,
             director_error,
+            alignment: mean_alignment(&self.particles, &self.matter.materials),
             active_rotation: r.active_rotation,
             splits: self.count.splits,
             merges: self.count.merges,

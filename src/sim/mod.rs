@@ -131,8 +131,6 @@ pub trait Run: Send {
     fn pressure_at(&self, p: [f64; 2]) -> f64;
     /// What the recording shows of the current state.
     fn picture(&self) -> crate::frame::Picture;
-    /// Volume mean of |n_x| over layered particles; `None` without directors.
-    fn mean_alignment(&self) -> Option<f64>;
     /// SHA-256 over the bits of the particle state.
     fn state_hash(&self) -> String;
     /// Unknowns of the solver: velocity and rotation, pressure.
@@ -422,9 +420,6 @@ impl<const D: usize> Run for Simulation<D> {
     }
     fn picture(&self) -> crate::frame::Picture {
         self.draw()
-    }
-    fn mean_alignment(&self) -> Option<f64> {
-        measure::mean_alignment(&self.particles, &self.matter.materials)
     }
     fn state_hash(&self) -> String {
         measure::hash(&self.particles)

@@ -37,6 +37,8 @@ pub struct Row {
     pub dissipated: f64,
     /// Largest `| |n| - 1 |`; zero without directors.
     pub director_error: f64,
+    /// Volume mean of |n_x| over layered particles; `None` without directors.
+    pub alignment: Option<f64>,
     /// Rotation unknowns that a Cosserat material acts on.
     pub active_rotation: usize,
     pub splits: u64,

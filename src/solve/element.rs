@@ -8,9 +8,12 @@
 //! Local unknowns are ordered component by component: `9 c + a` for component `c` (u, v, w) of
 //! node `a`. `D` is 2 for the classical continuum, 3 with Cosserat rotation.
 
+use super::quadrature::{IntegrationPoint, Quadrature};
 use crate::laws::point::PointLaw;
-use crate::space::shape::{CENTRE, GAUSS_3X3, NODES, PRESSURE_MASS, Shape};
-use std::sync::LazyLock;
+use crate::space::shape::{
+    CENTRE, D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, N_AT_GAUSS, NODES,
+    PRESSURE_MASS, Shape, Table,
+};
 
 /// Local unknowns with rotation; classical elements use the first 18.
 pub const LOCAL: usize = 3 * NODES;
@@ -33,6 +36,30 @@ impl PointShape {
     }
 }
 
+/// The nodal unknowns differentiated at a point: `x[c]`, `y[c]` of component `c`, and `w` itself.
+#[derive(Clone, Copy)]
+pub struct Gradient<const D: usize> {
+    x: [f64; D],
+    y: [f64; D],
+    w: f64,
+}
+
+impl<const D: usize> Gradient<D> {
+    pub fn at(s: &PointShape, u: &Nodal<D>) -> Self {
+        let mut g = Gradient { x: [0.0; D], y: [0.0; D], w: 0.0 };
+        for a in 0..NODES {
+            for c in 0..D {
+                g.x[c] += s.gx[a] * u[a][c];
+                g.y[c] += s.gy[a] * u[a][c];
+            }
+            if D == 3 {
+                g.w += s.n[a] * u[a][D - 1];
+            }
+        }
+        g
+    }
+}
+
 /// Rates at an integration point.
 #[derive(Clone, Copy, Default)]
 pub struct Rates {
@@ -48,24 +75,16 @@ pub struct Rates {
 
 impl Rates {
     pub fn new<const D: usize>(s: &PointShape, u: &Nodal<D>) -> Self {
-        let (mut ux, mut uy, mut vx, mut vy) = (0.0, 0.0, 0.0, 0.0);
-        let (mut w, mut wx, mut wy) = (0.0, 0.0, 0.0);
-        for a in 0..NODES {
-            ux += s.gx[a] * u[a][0];
-            uy += s.gy[a] * u[a][0];
-            vx += s.gx[a] * u[a][1];
-            vy += s.gy[a] * u[a][1];
-            if D == 3 {
-                w += s.n[a] * u[a][2];
-                wx += s.gx[a] * u[a][2];
-                wy += s.gy[a] * u[a][2];
-            }
-        }
+        Rates::of(&Gradient::at(s, u))
+    }
+
+    pub fn of<const D: usize>(g: &Gradient<D>) -> Self {
+        let ([ux, vx], [uy, vy]) = ([g.x[0], g.x[1]], [g.y[0], g.y[1]]);
         Rates {
             d: [ux - vy, uy + vx],
             trace: ux + vy,
-            relative_spin: if D == 3 { 0.5 * (vx - uy) - w } else { 0.0 },
-            kappa: [wx, wy],
+            relative_spin: if D == 3 { 0.5 * (vx - uy) - g.w } else { 0.0 },
+            kappa: if D == 3 { [g.x[D - 1], g.y[D - 1]] } else { [0.0; 2] },
         }
     }
 
@@ -83,121 +102,258 @@ impl Rates {
     }
 }
 
-/// Adds the virtual power of the stresses at a point of volume `volume` to the nodal forces.
-pub fn add_internal_force<const D: usize>(
-    f: &mut Nodal<D>,
-    s: &PointShape,
-    law: &PointLaw,
-    r: &Rates,
-    volume: f64,
-) {
-    let t0 = volume * (law.shear.a * r.d[0] + law.shear.c * r.d[1]);
-    let t1 = volume * (law.shear.c * r.d[0] + law.shear.b * r.d[1]);
-    let t2 = volume * law.dilation * r.trace;
-    let t3 = volume * 4.0 * law.coupling * r.relative_spin;
-    let (t4, t5) = (volume * law.couple * r.kappa[0], volume * law.couple * r.kappa[1]);
-    let half = if D == 3 { 0.5 * t3 } else { 0.0 };
-    for a in 0..NODES {
-        f[a][0] += (t2 + t0) * s.gx[a] + (t1 - half) * s.gy[a];
-        f[a][1] += (t1 + half) * s.gx[a] + (t2 - t0) * s.gy[a];
+/// Stresses at a point times its volume, by what they are conjugate to: their virtual power is
+/// `sum_c x[c] du_c/dx + y[c] du_c/dy + w w~`.
+#[derive(Clone, Copy)]
+pub struct Stress<const D: usize> {
+    x: [f64; D],
+    y: [f64; D],
+    w: f64,
+}
+
+impl<const D: usize> Stress<D> {
+    pub fn new(law: &PointLaw, r: &Rates, volume: f64) -> Self {
+        let t0 = volume * (law.shear.a * r.d[0] + law.shear.c * r.d[1]);
+        let t1 = volume * (law.shear.c * r.d[0] + law.shear.b * r.d[1]);
+        let t2 = volume * law.dilation * r.trace;
+        let t3 = if D == 3 { volume * 4.0 * law.coupling * r.relative_spin } else { 0.0 };
+        let mut stress = Stress { x: [0.0; D], y: [0.0; D], w: -t3 };
+        (stress.x[0], stress.y[0]) = (t2 + t0, t1 - 0.5 * t3);
+        (stress.x[1], stress.y[1]) = (t1 + 0.5 * t3, t2 - t0);
         if D == 3 {
-            f[a][2] += t4 * s.gx[a] + t5 * s.gy[a] - t3 * s.n[a];
+            stress.x[D - 1] = volume * law.couple * r.kappa[0];
+            stress.y[D - 1] = volume * law.couple * r.kappa[1];
+        }
+        stress
+    }
+
+    /// Adds the virtual power to the nodal forces.
+    pub fn add_force(&self, s: &PointShape, f: &mut Nodal<D>) {
+        for a in 0..NODES {
+            for c in 0..D {
+                f[a][c] += self.x[c] * s.gx[a] + self.y[c] * s.gy[a];
+            }
+            if D == 3 {
+                f[a][D - 1] += self.w * s.n[a];
+            }
         }
     }
 }
 
-/// Adds the stiffness of a point of volume `volume` to the element matrix (both triangles).
-pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &PointLaw, volume: f64) {
-    let (sa, sb, sc) = (volume * law.shear.a, volume * law.shear.b, volume * law.shear.c);
-    let beta = volume * law.dilation;
-    let spin = if D == 3 { 4.0 * volume * law.coupling } else { 0.0 };
-    let couple = volume * law.couple;
-    let mut row = |i: usize, t: [f64; 6]| {
-        let [t0, t1, t2, t3, t4, t5] = t;
-        let k = &mut k[i];
-        for a in 0..NODES {
-            k[a] += (t2 + t0) * s.gx[a] + (t1 - 0.5 * t3) * s.gy[a];
+/// [`Gradient`]s or [`Stress`]es at the nine Gauss points, component by component.
+///
+/// Sums over nodes or points then run over contiguous numbers, which SSE2 halves.
+struct GaussField<const D: usize> {
+    x: [[f64; 9]; D],
+    y: [[f64; 9]; D],
+    w: [f64; 9],
+}
+
+impl<const D: usize> GaussField<D> {
+    fn gradient(u: &Nodal<D>, [hx, hy]: [f64; 2]) -> Self {
+        let component = |c: usize| -> [f64; NODES] { std::array::from_fn(|a| u[a][c]) };
+        GaussField {
+            x: std::array::from_fn(|c| combine(&D_XI_AT_GAUSS.by_node, &component(c), 2.0 / hx)),
+            y: std::array::from_fn(|c| combine(&D_ETA_AT_GAUSS.by_node, &component(c), 2.0 / hy)),
+            w: if D == 3 { combine(&N_AT_GAUSS.by_node, &component(D - 1), 1.0) } else { [0.0; 9] },
         }
-        for a in 0..NODES {
-            k[NODES + a] += (t1 + 0.5 * t3) * s.gx[a] + (t2 - t0) * s.gy[a];
+    }
+
+    fn gradient_at(&self, g: usize) -> Gradient<D> {
+        Gradient {
+            x: std::array::from_fn(|c| self.x[c][g]),
+            y: std::array::from_fn(|c| self.y[c][g]),
+            w: self.w[g],
         }
-        if D == 3 {
+    }
+
+    fn set_stress(&mut self, g: usize, t: &Stress<D>) {
+        for c in 0..D {
+            (self.x[c][g], self.y[c][g]) = (t.x[c], t.y[c]);
+        }
+        self.w[g] = t.w;
+    }
+
+    /// Nodal forces of stresses.
+    fn force(&self, [hx, hy]: [f64; 2]) -> Nodal<D> {
+        let mut f = [[0.0; D]; NODES];
+        for c in 0..D {
+            let x = combine(&D_XI_AT_GAUSS.by_point, &self.x[c], 2.0 / hx);
+            let y = combine(&D_ETA_AT_GAUSS.by_point, &self.y[c], 2.0 / hy);
             for a in 0..NODES {
-                k[2 * NODES + a] += t4 * s.gx[a] + t5 * s.gy[a] - t3 * s.n[a];
+                f[a][c] = x[a] + y[a];
             }
         }
-    };
-    for a in 0..NODES {
-        let (gx, gy, n) = (s.gx[a], s.gy[a], s.n[a]);
-        row(a, [sa * gx + sc * gy, sc * gx + sb * gy, beta * gx, -0.5 * spin * gy, 0.0, 0.0]);
-        row(
-            NODES + a,
-            [-sa * gy + sc * gx, -sc * gy + sb * gx, beta * gy, 0.5 * spin * gx, 0.0, 0.0],
-        );
         if D == 3 {
-            row(2 * NODES + a, [0.0, 0.0, 0.0, -spin * n, couple * gx, couple * gy]);
+            let n = combine(&N_AT_GAUSS.by_point, &self.w, 1.0);
+            for a in 0..NODES {
+                f[a][D - 1] += n[a];
+            }
+        }
+        f
+    }
+}
+
+/// `scale sum_k v[k] table[k]`
+#[inline(always)]
+fn combine(table: &[[f64; 9]; 9], v: &[f64; 9], scale: f64) -> [f64; 9] {
+    let mut out = [0.0; 9];
+    for k in 0..9 {
+        for i in 0..9 {
+            out[i] += v[k] * table[k][i];
+        }
+    }
+    out.map(|x| scale * x)
+}
+
+/// What a cell's stresses do: nodal forces, and powers that come with them.
+#[derive(Clone, Copy)]
+pub struct Internal<const D: usize> {
+    pub force: Nodal<D>,
+    pub dissipation: f64,
+    /// `integral D:D`
+    pub strain: f64,
+}
+
+impl<const D: usize> Internal<D> {
+    /// Of a cell of this size with nodal values `u`.
+    pub fn new(quadrature: &Quadrature, cell: usize, size: [f64; 2], u: &Nodal<D>) -> Self {
+        match quadrature.gauss_points(cell) {
+            Some(points) => Internal::at_gauss_points(points, size, u),
+            None => Internal::at_any_points(quadrature, cell, size, u),
+        }
+    }
+
+    fn at_gauss_points(points: &[IntegrationPoint; 9], size: [f64; 2], u: &Nodal<D>) -> Self {
+        let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
+        let mut field = GaussField::gradient(u, size);
+        for (g, p) in points.iter().enumerate() {
+            let rates = Rates::of(&field.gradient_at(g));
+            field.set_stress(g, &out.stress(p, &rates, size));
+        }
+        out.force = field.force(size);
+        out
+    }
+
+    fn at_any_points(quadrature: &Quadrature, cell: usize, size: [f64; 2], u: &Nodal<D>) -> Self {
+        let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
+        quadrature.for_points(cell, |p, shape| {
+            let s = PointShape::new(shape, size);
+            out.stress(p, &Rates::new(&s, u), size).add_force(&s, &mut out.force);
+        });
+        out
+    }
+
+    /// Stress at a point, whose powers are added.
+    fn stress(&mut self, p: &IntegrationPoint, r: &Rates, [hx, hy]: [f64; 2]) -> Stress<D> {
+        let volume = p.weight * hx * hy;
+        self.dissipation += volume * r.power(&p.law);
+        self.strain += volume * r.strain_squared();
+        Stress::new(&p.law, r, volume)
+    }
+}
+
+/// Adds the stiffness of a point of volume `volume` to the element matrix: only blocks of
+/// components on and below the diagonal; [`mirror`] completes them.
+pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &PointLaw, volume: f64) {
+    for component in 0..D {
+        for a in 0..NODES {
+            let mut g = Gradient { x: [0.0; D], y: [0.0; D], w: 0.0 };
+            (g.x[component], g.y[component]) = (s.gx[a], s.gy[a]);
+            if component == 2 {
+                g.w = s.n[a];
+            }
+            // The stress of a unit value of this unknown; what it does to others is the row.
+            let t = Stress::<D>::new(law, &Rates::of(&g), volume);
+            let row = &mut k[NODES * component + a];
+            for c in 0..=component {
+                for b in 0..NODES {
+                    row[NODES * c + b] += t.x[c] * s.gx[b] + t.y[c] * s.gy[b];
+                }
+            }
+            if component == 2 {
+                for b in 0..NODES {
+                    row[2 * NODES + b] += t.w * s.n[b];
+                }
+            }
+        }
+    }
+}
+
+/// Copies the blocks of components below the diagonal to those above.
+pub fn mirror<const D: usize>(k: &mut Matrix) {
+    for i in NODES..NODES * D {
+        for j in 0..i - i % NODES {
+            k[j][i] = k[i][j];
         }
     }
 }
 
 /// `integral q d/dx N` and `integral q d/dy N` on a cell: the divergence matrix of the pressure
-/// basis `1, xi, eta`.
+/// basis `1, xi, eta`, as tables of the reference cell and what they are multiplied with.
 #[derive(Clone, Copy)]
 pub struct Divergence {
-    pub x: [[f64; NODES]; 3],
-    pub y: [[f64; NODES]; 3],
+    x_scale: f64,
+    y_scale: f64,
 }
 
-static REFERENCE_DIVERGENCE: LazyLock<Divergence> = LazyLock::new(|| {
-    let mut b = Divergence { x: [[0.0; NODES]; 3], y: [[0.0; NODES]; 3] };
-    for g in GAUSS_3X3.iter() {
-        let q = [1.0, g.r[0], g.r[1]];
-        for (i, q) in q.iter().enumerate() {
-            for a in 0..NODES {
-                b.x[i][a] += g.weight * q * g.shape.d_xi[a];
-                b.y[i][a] += g.weight * q * g.shape.d_eta[a];
-            }
-        }
+/// The matrices of a cell of size 2 x 2 for `d/dx` and `d/dy`, divided by its area.
+static REFERENCE_DIVERGENCE: [[[f64; NODES]; 3]; 2] =
+    [reference_divergence(&D_XI_AT_GAUSS), reference_divergence(&D_ETA_AT_GAUSS)];
+
+const fn reference_divergence(slope: &Table) -> [[f64; NODES]; 3] {
+    let mut b = [[0.0; NODES]; 3];
+    let mut k = 0;
+    while k < 81 {
+        let (g, a) = (k / 9, k % 9);
+        let weighted = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3] * slope.by_point[g][a];
+        b[0][a] += weighted;
+        b[1][a] += GAUSS_3[g % 3] * weighted;
+        b[2][a] += GAUSS_3[g / 3] * weighted;
+        k += 1;
     }
     b
-});
+}
 
 impl Divergence {
     pub fn new([hx, hy]: [f64; 2]) -> Self {
-        let r = &*REFERENCE_DIVERGENCE;
-        Divergence {
-            x: r.x.map(|row| row.map(|v| v * 2.0 * hy)),
-            y: r.y.map(|row| row.map(|v| v * 2.0 * hx)),
-        }
+        Divergence { x_scale: 2.0 * hy, y_scale: 2.0 * hx }
     }
 
     /// `B u`
     pub fn apply<const D: usize>(&self, u: &Nodal<D>) -> [f64; 3] {
-        std::array::from_fn(|q| {
-            (0..NODES).map(|a| self.x[q][a] * u[a][0] + self.y[q][a] * u[a][1]).sum()
-        })
+        let [x, y] = &REFERENCE_DIVERGENCE;
+        let mut sum = [[0.0; 3]; 2];
+        for a in 0..NODES {
+            for q in 0..3 {
+                sum[0][q] += x[q][a] * u[a][0];
+                sum[1][q] += y[q][a] * u[a][1];
+            }
+        }
+        std::array::from_fn(|q| self.x_scale * sum[0][q] + self.y_scale * sum[1][q])
     }
 
     /// `f += B^T p`
     pub fn add_transposed<const D: usize>(&self, p: &[f64; 3], f: &mut Nodal<D>) {
-        for q in 0..3 {
-            for a in 0..NODES {
-                f[a][0] += self.x[q][a] * p[q];
-                f[a][1] += self.y[q][a] * p[q];
-            }
+        let [x, y] = &REFERENCE_DIVERGENCE;
+        let (px, py) = (p.map(|p| self.x_scale * p), p.map(|p| self.y_scale * p));
+        for a in 0..NODES {
+            f[a][0] += x[0][a] * px[0] + x[1][a] * px[1] + x[2][a] * px[2];
+            f[a][1] += y[0][a] * py[0] + y[1][a] * py[1] + y[2][a] * py[2];
         }
     }
 
-    /// `k += B^T diag(w) B`
+    /// `k += B^T diag(w) B`, on and below the diagonal of components.
     pub fn add_penalty(&self, w: &[f64; 3], k: &mut Matrix) {
+        let [x, y] = &REFERENCE_DIVERGENCE;
         for q in 0..3 {
+            let bx = x[q].map(|v| v * self.x_scale);
+            let by = y[q].map(|v| v * self.y_scale);
             for a in 0..NODES {
-                let (x, y) = (w[q] * self.x[q][a], w[q] * self.y[q][a]);
                 for b in 0..NODES {
-                    k[a][b] += x * self.x[q][b];
-                    k[a][NODES + b] += x * self.y[q][b];
-                    k[NODES + a][b] += y * self.x[q][b];
-                    k[NODES + a][NODES + b] += y * self.y[q][b];
+                    k[a][b] += w[q] * bx[a] * bx[b];
+                    k[NODES + a][b] += w[q] * by[a] * bx[b];
+                    k[NODES + a][NODES + b] += w[q] * by[a] * by[b];
                 }
             }
         }
@@ -294,4 +450,97 @@ fn invert<const D: usize>(a: &nalgebra::SMatrix<f64, D, D>) -> nalgebra::SMatrix
         }
     }
     inverse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::point::Sym2;
+    use crate::space::shape::{GAUSS_3X3, GaussPoint};
+
+    const SIZE: [f64; 2] = [0.7, 1.3];
+
+    /// Nine points with different anisotropic laws that have every term.
+    fn points() -> [IntegrationPoint; 9] {
+        std::array::from_fn(|g| {
+            let t = g as f64;
+            let law = PointLaw {
+                shear: Sym2 { a: 2.0 + 0.3 * t, b: 1.0 + 0.1 * t, c: 0.4 - 0.1 * t },
+                dilation: 1.5 + 0.2 * t,
+                coupling: 0.8 + 0.05 * t,
+                couple: 0.3 + 0.02 * t,
+            };
+            let GaussPoint { weight, r, .. } = GAUSS_3X3[g];
+            IntegrationPoint { law, density: 1.0, weight, r }
+        })
+    }
+
+    fn stiffness<const D: usize>() -> Matrix {
+        let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
+        for (p, g) in points().iter().zip(GAUSS_3X3.iter()) {
+            let volume = p.weight * SIZE[0] * SIZE[1];
+            add_stiffness::<D>(&mut k, &PointShape::new(&g.shape, SIZE), &p.law, volume);
+        }
+        mirror::<D>(&mut k);
+        k
+    }
+
+    fn some_values<const D: usize>() -> Nodal<D> {
+        std::array::from_fn(|a| std::array::from_fn(|c| ((3 * a + 7 * c) as f64).sin()))
+    }
+
+    /// The loop over points that [`GaussField`] replaces.
+    fn force_point_by_point<const D: usize>(u: &Nodal<D>) -> Nodal<D> {
+        let mut f = [[0.0; D]; NODES];
+        for p in points() {
+            let s = PointShape::new(&Shape::at(p.r), SIZE);
+            let volume = p.weight * SIZE[0] * SIZE[1];
+            Stress::new(&p.law, &Rates::new(&s, u), volume).add_force(&s, &mut f);
+        }
+        f
+    }
+
+    fn stiffness_times_vector_is_the_internal_force<const D: usize>() {
+        let (k, u) = (stiffness::<D>(), some_values::<D>());
+        let internal = Internal::at_gauss_points(&points(), SIZE, &u);
+        let by_point = force_point_by_point(&u);
+        let mut power = 0.0;
+        for a in 0..NODES {
+            for c in 0..D {
+                let row = &k[NODES * c + a];
+                let ku: f64 = (0..NODES * D).map(|j| row[j] * u[j % NODES][j / NODES]).sum();
+                assert!((ku - internal.force[a][c]).abs() < 1e-12, "node {a}, component {c}");
+                assert!((ku - by_point[a][c]).abs() < 1e-12, "node {a}, component {c}");
+                power += ku * u[a][c];
+            }
+        }
+        assert!((power - internal.dissipation).abs() < 1e-12 * power);
+    }
+
+    #[test]
+    fn stiffness_and_internal_force_agree() {
+        stiffness_times_vector_is_the_internal_force::<2>();
+        stiffness_times_vector_is_the_internal_force::<3>();
+    }
+
+    #[test]
+    fn stiffness_is_symmetric() {
+        let k = stiffness::<3>();
+        for i in 0..LOCAL {
+            for j in 0..i {
+                assert!((k[i][j] - k[j][i]).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn a_rigid_rotation_with_matching_w_makes_no_force() {
+        let u: Nodal<3> = std::array::from_fn(|a| {
+            let (x, y) = ((a % 3) as f64 * 0.5 * SIZE[0], (a / 3) as f64 * 0.5 * SIZE[1]);
+            [-0.9 * y + 0.2, 0.9 * x - 0.1, 0.9]
+        });
+        let internal = Internal::at_gauss_points(&points(), SIZE, &u);
+        assert!(internal.force.iter().flatten().all(|f| f.abs() < 1e-13));
+        assert!(internal.dissipation < 1e-25);
+    }
 }

@@ -15,8 +15,8 @@
 
 use super::cholesky::{FactorError, SparseCholesky};
 use super::element::{
-    Condensed, Divergence, LOCAL, Matrix, Nodal, PointShape, Rates, SKELETON_NODES,
-    add_internal_force, add_stiffness, pair, pressure_mass,
+    Condensed, Divergence, Internal, LOCAL, Matrix, Nodal, PointShape, SKELETON_NODES,
+    add_stiffness, mirror, pair, pressure_mass,
 };
 use super::quadrature::{Content, Quadrature};
 use crate::space::constraints::Constraints;
@@ -100,6 +100,8 @@ impl SolveError {
 /// The discrete problem on one mesh: pattern, boundary conditions, element matrices.
 pub struct Stokes<const D: usize> {
     mesh: Arc<Mesh>,
+    /// Of every cell: each correction asks five times, and finding them takes divisions.
+    nodes: Vec<[usize; NODES]>,
     skeleton: Skeleton,
     constraints: Constraints<D>,
     matrix: SparseCholesky,
@@ -108,6 +110,7 @@ pub struct Stokes<const D: usize> {
     cells: Vec<CellMatrix<D>>,
     /// Unaugmented diagonal, per node.
     diagonal: Vec<[f64; D]>,
+    work: Work<D>,
 }
 
 #[derive(Clone)]
@@ -119,7 +122,24 @@ struct CellMatrix<const D: usize> {
     penalty: [f64; 3],
 }
 
+/// What a solution is asked for.
+struct Given<'a, const D: usize> {
+    quadrature: &'a Quadrature,
+    load: &'a [[f64; D]],
+    stopping: Stopping,
+}
+
+/// Vectors of the corrections, kept from one solution to the next.
+#[derive(Default)]
+struct Work<const D: usize> {
+    residual: Residual<D>,
+    /// Right-hand side and solution on the skeleton.
+    skeleton: Vec<f64>,
+    correction: Vec<[f64; D]>,
+}
+
 /// Residuals of a state, and powers that come with them.
+#[derive(Default)]
 struct Residual<const D: usize> {
     /// `f - K u + B' p`, constrained rows included.
     force: Vec<[f64; D]>,
@@ -166,6 +186,8 @@ impl<const D: usize> Stokes<D> {
         Ok(Stokes {
             cells: vec![empty; mesh.cells()],
             diagonal: vec![[0.0; D]; mesh.nodes()],
+            nodes: (0..mesh.cells()).map(|cell| mesh.cell_nodes(cell)).collect(),
+            work: Work::default(),
             mesh,
             skeleton,
             constraints,
@@ -206,27 +228,44 @@ impl<const D: usize> Stokes<D> {
         report.seconds.factor = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         self.constraints.impose(&mut flow.velocity);
+        let mut work = std::mem::take(&mut self.work);
+        let outcome =
+            self.iterate(&Given { quadrature, load, stopping }, flow, &mut report, &mut work);
+        self.work = work;
+        outcome?;
+        self.constraints.remove_null_space(&self.mesh, flow);
+        report.seconds.solve = clock.elapsed().as_secs_f64();
+        Ok(report)
+    }
+
+    /// Corrects `flow` until the residual is small.
+    fn iterate(
+        &mut self,
+        given: &Given<D>,
+        flow: &mut Flow<D>,
+        report: &mut Report,
+        work: &mut Work<D>,
+    ) -> Result<(), SolveError> {
+        let &Given { quadrature, load, stopping } = given;
         loop {
-            let residual = self.residual(quadrature, load, flow);
+            self.residual(quadrature, load, flow, &mut work.residual);
+            let residual = &work.residual;
             (report.residual, report.divergence, report.load_scale) =
-                self.norms(&residual, load, flow);
+                self.norms(residual, load, flow);
             report.dissipation = residual.dissipation;
-            report.power_in = self.power_in(&residual, load, flow);
+            report.power_in = self.power_in(residual, load, flow);
             if !(report.residual.is_finite() && report.divergence.is_finite()) {
                 return Err(SolveError::NonFinite { corrections: report.corrections });
             }
             if report.residual <= stopping.tolerance && report.divergence <= stopping.tolerance {
-                break;
+                return Ok(());
             }
             if report.corrections == stopping.max_corrections {
-                return Err(self.stalled(&residual, &report));
+                return Err(self.stalled(residual, report));
             }
-            self.correct(residual, flow).map_err(|e| self.explain(e))?;
+            self.correct(work, flow).map_err(|e| self.explain(e))?;
             report.corrections += 1;
         }
-        self.constraints.remove_null_space(&self.mesh, flow);
-        report.seconds.solve = clock.elapsed().as_secs_f64();
-        Ok(report)
     }
 
     /// Element matrices of the cells that changed, and the skeleton matrix; number of active
@@ -266,7 +305,8 @@ impl<const D: usize> Stokes<D> {
             }
         }
         Divergence::new(size).add_penalty(&out.penalty, &mut k);
-        for (a, node) in self.mesh.cell_nodes(cell).into_iter().enumerate() {
+        mirror::<D>(&mut k);
+        for (a, node) in self.nodes[cell].into_iter().enumerate() {
             for c in 0..D {
                 if self.constraints.is_fixed(node, c) {
                     let i = NODES * c + a;
@@ -279,7 +319,7 @@ impl<const D: usize> Stokes<D> {
     }
 
     fn scatter(&mut self, cell: usize) {
-        let nodes = self.mesh.cell_nodes(cell);
+        let nodes = self.nodes[cell];
         let position = SKELETON_NODES.map(|a| self.skeleton.position[nodes[a]] as usize);
         let built = &self.cells[cell];
         for (a, node) in nodes.into_iter().enumerate() {
@@ -316,27 +356,24 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    fn residual(&self, quadrature: &Quadrature, load: &[[f64; D]], flow: &Flow<D>) -> Residual<D> {
-        let mut out = Residual {
-            force: load.to_vec(),
-            divergence: vec![[0.0; 3]; self.mesh.cells()],
-            dissipation: 0.0,
-            strain: 0.0,
-            divergence_norm: 0.0,
-        };
+    fn residual(
+        &self,
+        quadrature: &Quadrature,
+        load: &[[f64; D]],
+        flow: &Flow<D>,
+        out: &mut Residual<D>,
+    ) {
+        out.force.clear();
+        out.force.extend_from_slice(load);
+        out.divergence.resize(self.mesh.cells(), [0.0; 3]);
+        (out.dissipation, out.strain, out.divergence_norm) = (0.0, 0.0, 0.0);
         for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
             let size = self.mesh.cell_size(cell);
             let area = size[0] * size[1];
-            let u = flow.of_cell(&self.mesh, cell);
-            let mut f = [[0.0; D]; NODES];
-            quadrature.for_points(cell, |p, shape| {
-                let s = PointShape::new(shape, size);
-                let rates = Rates::new(&s, &u);
-                let volume = p.weight * area;
-                add_internal_force(&mut f, &s, &p.law, &rates, volume);
-                out.dissipation += volume * rates.power(&p.law);
-                out.strain += volume * rates.strain_squared();
-            });
+            let u = self.nodes[cell].map(|n| flow.velocity[n]);
+            let internal = Internal::new(quadrature, cell, size, &u);
+            out.dissipation += internal.dissipation;
+            out.strain += internal.strain;
             let divergence = Divergence::new(size);
             let mass = pressure_mass(area);
             let pressure = flow.pressure[cell];
@@ -350,13 +387,12 @@ impl<const D: usize> Stokes<D> {
                 out.divergence_norm += rp * rp / mass[q];
                 out.dissipation += compliance * mass[q] * pressure[q] * pressure[q];
             }
-            for (a, node) in self.mesh.cell_nodes(cell).into_iter().enumerate() {
+            for (a, node) in self.nodes[cell].into_iter().enumerate() {
                 for c in 0..D {
-                    out.force[node][c] += g[a][c] - f[a][c];
+                    out.force[node][c] += g[a][c] - internal.force[a][c];
                 }
             }
         }
-        out
     }
 
     /// Scaled residual, relative divergence, and the loads' own scale of power.
@@ -397,24 +433,26 @@ impl<const D: usize> Stokes<D> {
         power
     }
 
-    fn correct(&mut self, r: Residual<D>, flow: &mut Flow<D>) -> Result<(), FactorError> {
-        let mut force = r.force;
+    /// One correction; uses the residual up.
+    fn correct(&mut self, work: &mut Work<D>, flow: &mut Flow<D>) -> Result<(), FactorError> {
+        let Work { residual: r, skeleton: x, correction: du } = work;
+        let force = &mut r.force;
         for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
             let divergence = Divergence::new(self.mesh.cell_size(cell));
             let penalty = self.cells[cell].penalty;
             let p: [f64; 3] = std::array::from_fn(|q| -penalty[q] * r.divergence[cell][q]);
             let mut f = [[0.0; D]; NODES];
             divergence.add_transposed(&p, &mut f);
-            for (a, node) in self.mesh.cell_nodes(cell).into_iter().enumerate() {
+            for (a, node) in self.nodes[cell].into_iter().enumerate() {
                 for c in 0..D {
                     force[node][c] += f[a][c];
                 }
             }
         }
-        self.constraints.clear_fixed(&mut force);
+        self.constraints.clear_fixed(force);
         // Condense the centres.
         for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
-            let nodes = self.mesh.cell_nodes(cell);
+            let nodes = self.nodes[cell];
             let centre = force[nodes[CENTRE]];
             for (l, &a) in SKELETON_NODES.iter().enumerate() {
                 let coupling = &self.cells[cell].condensed.coupling[l];
@@ -423,18 +461,18 @@ impl<const D: usize> Stokes<D> {
                 }
             }
         }
-        let mut x = vec![0.0; self.matrix.unknowns()];
+        x.resize(self.matrix.unknowns(), 0.0);
         for (position, &node) in self.skeleton.node.iter().enumerate() {
             x[D * position..D * position + D].copy_from_slice(&force[node as usize]);
         }
-        self.matrix.solve(&mut x)?;
-        let mut du = vec![[0.0; D]; self.mesh.nodes()];
+        self.matrix.solve(x)?;
+        du.resize(self.mesh.nodes(), [0.0; D]);
         for (position, &node) in self.skeleton.node.iter().enumerate() {
             du[node as usize].copy_from_slice(&x[D * position..D * position + D]);
         }
-        self.constraints.clear_fixed(&mut du);
+        self.constraints.clear_fixed(du);
         for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
-            let nodes = self.mesh.cell_nodes(cell);
+            let nodes = self.nodes[cell];
             let built = &self.cells[cell];
             let centre = force[nodes[CENTRE]];
             let mut u: [f64; D] = std::array::from_fn(|r| {
@@ -452,7 +490,7 @@ impl<const D: usize> Stokes<D> {
                 flow.pressure[cell][q] -= built.penalty[q] * (r.divergence[cell][q] + bdu[q]);
             }
         }
-        for (u, du) in flow.velocity.iter_mut().zip(&du) {
+        for (u, du) in flow.velocity.iter_mut().zip(du.iter()) {
             for c in 0..D {
                 u[c] += du[c];
             }

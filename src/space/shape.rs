@@ -14,7 +14,7 @@ pub const CENTRE: usize = 4;
 pub const PRESSURE_MASS: [f64; 3] = [1.0, 1.0 / 3.0, 1.0 / 3.0];
 
 /// Quadratic Lagrange functions at -1, 0, 1 and their derivatives.
-fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {
+const fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {
     ([0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)], [t - 0.5, -2.0 * t, t + 0.5])
 }
 
@@ -60,7 +60,8 @@ pub struct GaussPoint {
 
 /// Abscissae of the three-point rule.
 pub const GAUSS_3: [f64; 3] = [-0.774_596_669_241_483_4, 0.0, 0.774_596_669_241_483_4];
-const GAUSS_3_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
+/// Weights of the three-point rule.
+pub const GAUSS_3_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
 
 /// The 3 x 3 rule, exact to degree five in each direction, row by row from below.
 pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
@@ -70,6 +71,39 @@ pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
         GaussPoint { r, weight, shape: Shape::at(r) }
     })
 });
+
+/// The nine shape functions at the nine points of [`GAUSS_3X3`], as plain tables: loops over
+/// either index vectorise. By `[node][point]` they interpolate, by `[point][node]` they test.
+pub struct Table {
+    pub by_node: [[f64; 9]; NODES],
+    pub by_point: [[f64; NODES]; 9],
+}
+
+impl Table {
+    /// `x` and `y`: the factors in either direction, by `[Gauss abscissa][node]`.
+    const fn product(x: &[[f64; 3]; 3], y: &[[f64; 3]; 3]) -> Self {
+        let mut t = Table { by_node: [[0.0; 9]; NODES], by_point: [[0.0; NODES]; 9] };
+        let mut k = 0;
+        while k < 81 {
+            let (g, a) = (k / 9, k % 9);
+            let value = x[g % 3][a % 3] * y[g / 3][a / 3];
+            t.by_node[a][g] = value;
+            t.by_point[g][a] = value;
+            k += 1;
+        }
+        t
+    }
+}
+
+const AT_GAUSS: [([f64; 3], [f64; 3]); 3] =
+    [quadratic(GAUSS_3[0]), quadratic(GAUSS_3[1]), quadratic(GAUSS_3[2])];
+const VALUES: [[f64; 3]; 3] = [AT_GAUSS[0].0, AT_GAUSS[1].0, AT_GAUSS[2].0];
+const SLOPES: [[f64; 3]; 3] = [AT_GAUSS[0].1, AT_GAUSS[1].1, AT_GAUSS[2].1];
+/// Values at the Gauss points.
+pub static N_AT_GAUSS: Table = Table::product(&VALUES, &VALUES);
+/// Reference derivatives at the Gauss points.
+pub static D_XI_AT_GAUSS: Table = Table::product(&SLOPES, &VALUES);
+pub static D_ETA_AT_GAUSS: Table = Table::product(&VALUES, &SLOPES);
 
 /// Five-point Gauss rule `(abscissa, weight)` on `[-1, 1]`, weights adding up to 1: for loads and
 /// error norms, where 3 x 3 would be the error.
@@ -97,6 +131,18 @@ mod tests {
         let slope: f64 = (0..9).map(|k| s.d_xi[k] * nodal[k]).sum();
         assert!((value - f(r[0], r[1])).abs() < 1e-14);
         assert!((slope - fx(r[0], r[1])).abs() < 1e-14);
+    }
+
+    #[test]
+    fn tables_hold_the_shape_functions_at_the_gauss_points() {
+        for (p, g) in GAUSS_3X3.iter().enumerate() {
+            assert_eq!(N_AT_GAUSS.by_point[p], g.shape.n);
+            assert_eq!(D_XI_AT_GAUSS.by_point[p], g.shape.d_xi);
+            assert_eq!(D_ETA_AT_GAUSS.by_point[p], g.shape.d_eta);
+            for a in 0..NODES {
+                assert_eq!(D_XI_AT_GAUSS.by_node[a][p], g.shape.d_xi[a]);
+            }
+        }
     }
 
     #[test]

@@ -183,5 +183,5 @@ fn without_internal_length_the_shear_has_a_closed_form() {
     let eta = 1000.0 - 250.0 * (1.0 + q * (q - 4.0) / (q + 4.0f64).powi(2));
     let measured = speed(run.as_ref());
     assert!((measured / (1e4 / eta) - 1.0).abs() < 0.01, "{measured} {}", 1e4 / eta);
-    assert!((run.mean_alignment().unwrap() - alignment(low)).abs() < 0.01);
+    assert!((run.row().alignment.unwrap() - alignment(low)).abs() < 0.01);
 }

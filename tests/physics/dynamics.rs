@@ -173,3 +173,56 @@ fn discharge_orders_in_alpha_and_levels_off() {
     assert!(r[3] / r[4] - 1.0 < 0.015, "{r:?}");
     assert!(r[1] / r[3] - 1.0 > 0.05, "{r:?}");
 }
+
+#[test]
+fn five_alphas_discharge_in_order_to_the_last_snapshot() {
+    let volume = |alpha: &str| {
+        let mut run = preset("silo", &[alpha, "accuracy.cells=4", "recording.frames=1"]);
+        let first = run.row().potential_energy;
+        finish(run.as_mut(), |_| {});
+        let row = run.row();
+        let energy = energy_error(run.as_ref(), first);
+        println!("{alpha}: {} energy {energy:e} drift {:e}", row.gauges[0].volume, row.drift[0]);
+        assert!((row.time - 3.8e-3).abs() < 1e-12);
+        assert!(energy.abs() < 0.01, "{alpha}: energy {energy}");
+        row.gauges[0].volume
+    };
+    let v = ["alpha=0", "alpha=1/3", "alpha=2/3", "alpha=5/3", "alpha=10/3"].map(volume);
+    assert!(v.windows(2).all(|w| w[0] > w[1]), "{v:?}");
+    assert!(v[3] / v[4] - 1.0 < 0.015, "{v:?}");
+    assert!(v[1] / v[3] - 1.0 > 0.05, "{v:?}");
+}
+
+#[test]
+fn the_plain_method_of_the_source_gives_nearly_the_same_discharge() {
+    let rate = |quadrature: &str| {
+        let sets = ["accuracy.cells=6", "mesh.grading=[]", quadrature];
+        let mut run = preset("silo", &sets);
+        for _ in 0..10 {
+            run.step().unwrap();
+        }
+        run.row().gauges[0].rate
+    };
+    let (ours, plain) =
+        (rate("accuracy.quadrature=mixture"), rate("accuracy.quadrature=particles"));
+    assert!(ours != plain && (plain / ours - 1.0).abs() < 0.03, "{ours} {plain}");
+}
+
+#[test]
+fn compressible_particles_change_volume_with_the_flow() {
+    let side = "{ velocity_x = \"-0.3*x\", velocity_y = \"-0.1*y\" }";
+    let mut run = scene(
+        &format!(
+            "schema = 1\nname = \"squeeze\"\n[domain]\nx = [-1, 1]\ny = [-1, 1]\n[accuracy]\n\
+             cells = 6\n[time]\nend = 0.3\nmax_step = 0.05\n[materials.a]\nshear_viscosity = 3\n\
+             bulk_viscosity = 2\n[[regions]]\nmaterial = \"a\"\n[boundaries]\n\
+             left = {side}\nright = {side}\nbottom = {side}\ntop = {side}\n"
+        ),
+        &[],
+    );
+    let volume = |run: &dyn Run| run.particles().volume.iter().sum::<f64>();
+    let first = volume(run.as_ref());
+    finish(run.as_mut(), |_| {});
+    let expected = (-0.4 * 0.3f64).exp();
+    assert!((volume(run.as_ref()) / first / expected - 1.0).abs() < 1e-9);
+}

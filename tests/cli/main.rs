@@ -1,0 +1,164 @@
+//! The program as a user meets it: arguments in; exit code, text and files out.
+
+mod commands;
+mod recording;
+mod refusals;
+mod runs;
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder that is gone when the test is.
+struct TempFolder(grainscope::testing::TempFolder);
+
+impl TempFolder {
+    fn new() -> Self {
+        TempFolder(grainscope::testing::TempFolder::new().expect("a temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), text).expect("a file");
+    }
+
+    fn read(&self, name: &str) -> String {
+        let path = self.path(name);
+        std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    }
+
+    fn json(&self, name: &str) -> Value {
+        serde_json::from_str(&self.read(name)).expect("JSON")
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.path(name).exists()
+    }
+
+    /// The program, to be started in this folder.
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_grainscope"));
+        command.args(arguments).current_dir(self.0.path()).env("NO_COLOR", "1");
+        command
+    }
+
+    fn grainscope(&self, arguments: &[&str]) -> Said {
+        let output = self.command(arguments).output().expect("the program starts");
+        Said::new(arguments, output)
+    }
+}
+
+/// What the program answered.
+struct Said {
+    arguments: String,
+    code: Option<i32>,
+    out: String,
+    err: String,
+}
+
+impl Said {
+    fn new(arguments: &[&str], output: Output) -> Self {
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
+        Said {
+            arguments: arguments.join(" "),
+            code: output.status.code(),
+            out: text(&output.stdout),
+            err: text(&output.stderr),
+        }
+    }
+
+    #[track_caller]
+    fn exits(self, code: i32) -> Self {
+        let Said { arguments, out, err, .. } = &self;
+        assert_eq!(self.code, Some(code), "`{arguments}`\nstdout: {out}\nstderr: {err}");
+        assert!(!err.contains("panicked"), "`{arguments}`: {err}");
+        self
+    }
+
+    /// Whether stderr says all of this, wherever its lines are broken.
+    #[track_caller]
+    fn complains(self, parts: &[&str]) -> Self {
+        let said = flat(&self.err);
+        for part in parts {
+            assert!(said.contains(part), "`{}`: no {part:?} in\n{}", self.arguments, self.err);
+        }
+        self
+    }
+
+    #[track_caller]
+    fn prints(self, parts: &[&str]) -> Self {
+        for part in parts {
+            let Said { arguments, out, .. } = &self;
+            assert!(out.contains(part), "`{arguments}`: no {part:?} in\n{out}");
+        }
+        self
+    }
+
+    #[track_caller]
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.out)
+            .unwrap_or_else(|e| panic!("`{}`: {e} in\n{}", self.arguments, self.out))
+    }
+}
+
+/// The text without its line breaks and the frame that an error is drawn in.
+fn flat(text: &str) -> String {
+    text.replace(['│', '×'], " ").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Preset names and the texts of their files.
+fn preset_files() -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("presets");
+    let mut list: Vec<_> = std::fs::read_dir(folder)
+        .expect("presets/")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .map(|path| {
+            let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+            (name, std::fs::read_to_string(&path).expect("a preset"))
+        })
+        .collect();
+    list.sort();
+    assert!(!list.is_empty());
+    list
+}
+
+/// A table with a header.
+struct Table {
+    columns: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// Reads a CSV file; every row must be whole.
+    #[track_caller]
+    fn read(text: &str) -> Self {
+        assert!(text.ends_with('\n'), "the last row is cut: {text:?}");
+        let mut lines = text.lines().map(|l| l.split(',').map(String::from).collect::<Vec<_>>());
+        let columns = lines.next().expect("a header");
+        let rows: Vec<_> = lines.collect();
+        for row in &rows {
+            assert_eq!(row.len(), columns.len(), "{row:?}");
+        }
+        Table { columns, rows }
+    }
+
+    fn text(&self, name: &str) -> Vec<&str> {
+        let at = self.columns.iter().position(|c| c == name);
+        let at = at.unwrap_or_else(|| panic!("no column {name} in {:?}", self.columns));
+        self.rows.iter().map(|row| row[at].as_str()).collect()
+    }
+
+    fn numbers(&self, name: &str) -> Vec<f64> {
+        self.text(name).iter().map(|v| v.parse().expect("a number")).collect()
+    }
+
+    fn without(&self, name: &str) -> Vec<Vec<&str>> {
+        let kept = self.columns.iter().enumerate().filter(|(_, c)| *c != name);
+        let kept: Vec<usize> = kept.map(|(i, _)| i).collect();
+        self.rows.iter().map(|row| kept.iter().map(|&i| row[i].as_str()).collect()).collect()
+    }
+}

@@ -1,0 +1,240 @@
+//! Scenes that cannot be: each is refused with exit code 3, the place or key, and a remedy.
+
+use super::*;
+
+/// A closed box of sand with two walls in it.
+const BOX: &str = r#"schema = 1
+name = "box"
+gravity = [0, -10]
+
+[domain]
+x = [0, 2]
+y = [0, 1]
+
+[accuracy]
+cells = 4
+particles_per_cell = 4
+
+[time]
+end = 1
+max_step = 0.1
+
+[materials.sand]
+density = 1
+shear_viscosity = 100
+
+[[regions]]
+material = "sand"
+shape.rectangle.x = [0, 2]
+shape.rectangle.y = [0, 1]
+
+[boundaries]
+left.kind = "free_slip"
+right.kind = "free_slip"
+bottom.kind = "free_slip"
+top.kind = "free_slip"
+
+[[walls]]
+name = "left_wall"
+from = [0.5, 0.25]
+to = [0.5, 0.75]
+
+[[walls]]
+name = "right_wall"
+from = [1.5, 0.25]
+to = [1.5, 0.75]
+"#;
+
+/// What is replaced in the box by what; the text that the complaint points at, or "" if it names
+/// the key; and what it says.
+type Fault<'a> = (&'a str, &'a str, &'a str, &'a [&'a str]);
+
+const FAULTS: &[Fault] = &[
+    (
+        "shear_viscosity = 100",
+        "shear_viscosity = -5",
+        "-5",
+        &["`sand`: shear_viscosity is -5", "must be above zero"],
+    ),
+    (
+        "shear_viscosity = 100",
+        "shear_viscosity = nan",
+        "nan",
+        &["materials.sand.shear_viscosity", "NaN is not finite", "a finite number"],
+    ),
+    ("density = 1", "density = -1", "-1\n", &["`sand`: density is -1", "zero or more"]),
+    (
+        "shear_viscosity = 100",
+        "",
+        "",
+        &["material `sand` has no viscosity", "give shear_viscosity"],
+    ),
+    (
+        "shape.rectangle.x = [0, 2]",
+        "shape.rectangle.x = [-5, 2]",
+        "-5",
+        &["regions[0]: material `sand` reaches outside the domain", "the domain is 0 to 2"],
+    ),
+    (
+        "to = [0.5, 0.75]",
+        "to = [0.6, 0.75]",
+        "0.6",
+        &["wall `left_wall` is slanted", "follow mesh lines"],
+    ),
+    (
+        "from = [1.5, 0.25]\nto = [1.5, 0.75]",
+        "from = [0.55, 0.25]\nto = [0.55, 0.75]",
+        "",
+        &["left_wall", "right_wall", "closer than a cell", "raise accuracy.cells to at least 20"],
+    ),
+    (
+        "to = [0.5, 0.75]",
+        "to = [0.5, 1.75]",
+        "0.5, 1.75",
+        &["wall `left_wall` reaches (0.5, 1.75), outside the domain", "y = 0 to 1"],
+    ),
+    ("density = 1", "dnsity = 1", "dnsity", &["unknown key `dnsity`", "did you mean `density`?"]),
+    (
+        "density = 1",
+        "density = true",
+        "true",
+        &["materials.sand.density", "boolean `true`", "expected a number or an expression"],
+    ),
+    ("density = 1", "density = \"2 * rho\"", "rho\"", &["unknown name `rho`", "known names are"]),
+    (
+        "material = \"sand\"",
+        "material = \"snad\"",
+        "",
+        &["regions[0]", "the material `snad`, which does not exist", "did you mean `sand`?"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left.kind = \"periodic\"",
+        "",
+        &["only one of boundaries.left and boundaries.right is periodic", "on both"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left.kind = \"slippery\"",
+        "\"slippery\"",
+        &["unknown choice `slippery`", "`no_slip`"],
+    ),
+    (
+        "shear_viscosity = 100",
+        "shear_viscosity = 100\nlayer_viscosity = 5",
+        "",
+        &["regions[0]: the layered material `sand` has no directors", "director = \"random\""],
+    ),
+    (
+        "bottom.kind = \"free_slip\"\ntop.kind = \"free_slip\"",
+        "bottom.kind = \"periodic\"\ntop.kind = \"periodic\"",
+        "-10",
+        &["nothing holds the scene along y, and a net force acts there", "velocity_y"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left = { velocity_x = 0.25, traction_x = 1 }",
+        "0.25, traction",
+        &["boundaries.left gives both velocity_x and traction_x", "give one of them"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left = { velocity_x = 0.25 }",
+        "",
+        &["normal velocities let", "open a side"],
+    ),
+    ("cells = 4", "cells = 0", "", &["accuracy.cells is 0", "give 1 or more"]),
+    ("cells = 4", "cells = -4", "-4", &["accuracy.cells", "a whole number, 0 or more"]),
+    ("cells = 4", "cells = 100000", "", &["cells along x", "lower accuracy.cells"]),
+    (
+        "particles_per_cell = 4",
+        "particles_per_cell = 5",
+        "",
+        &["accuracy.particles_per_cell is 5", "a square number"],
+    ),
+    ("end = 1", "end = 0", "0\nmax_step", &["time.end is 0", "above zero"]),
+    ("x = [0, 2]", "x = [2, 0]", "0]\ny", &["domain.x is empty: [2, 0]", "above the first"]),
+    ("schema = 1", "schema = 7", "7", &["schema 7 is not known", "`schema = 1`"]),
+    ("[domain]", "[domain", "", &["not TOML", "check the TOML syntax"]),
+];
+
+/// `file:line:column` of a piece of text.
+fn place(text: &str, piece: &str) -> String {
+    let at = text.find(piece).unwrap_or_else(|| panic!("no {piece:?} in {text}"));
+    let before = &text[..at];
+    let column = 1 + before.chars().rev().take_while(|&c| c != '\n').count();
+    format!("[box.toml:{}:{column}]", 1 + before.matches('\n').count())
+}
+
+#[test]
+fn the_box_itself_is_valid_and_at_rest() {
+    let here = TempFolder::new();
+    here.write("box.toml", BOX);
+    here.grainscope(&["check", "box.toml"]).exits(0).prints(&["box.toml: ok (box)"]);
+    let run = ["run", "box.toml", "--no-recording", "--json"];
+    let summary = here.grainscope(&run).exits(0).json();
+    assert!(summary["max_speed"].as_f64() < Some(1e-9), "{summary}");
+}
+
+#[test]
+fn faults_are_placed_and_come_with_a_remedy() {
+    let here = TempFolder::new();
+    for (from, to, at, complaints) in FAULTS {
+        assert!(BOX.contains(from), "{from}");
+        let text = BOX.replacen(from, to, 1);
+        here.write("box.toml", &text);
+        for command in ["check", "plan", "run"] {
+            let said = here.grainscope(&[command, "box.toml"]).exits(3).complains(complaints);
+            assert!(said.out.is_empty(), "{}", said.out);
+            let said = said.complains(&["help: "]);
+            if !at.is_empty() {
+                said.complains(&[&place(&text, at)]);
+            }
+        }
+    }
+    assert!(!here.has("runs"), "scenes that are refused leave no folder behind");
+}
+
+#[test]
+fn what_is_no_scene_file_is_refused() {
+    let here = TempFolder::new();
+    here.write("empty.toml", "");
+    let garbage: Vec<u8> =
+        (0..10_000_000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    here.write("garbage.toml", garbage);
+    here.write("short.toml", b"\x00\x01\x02[[[=\n\x1b[2J");
+    here.write("latin.toml", b"name = \"\xe9\"");
+    std::fs::create_dir(here.path("folder.toml")).expect("a folder");
+    for (file, complaint) in [
+        ("empty.toml", "is empty"),
+        ("garbage.toml", "larger than 1 MiB"),
+        ("short.toml", "not TOML"),
+        ("latin.toml", "is not UTF-8 text"),
+        ("folder.toml", "is a directory"),
+        ("none.toml", "there is no such file"),
+        ("no/such/folder/none.toml", "there is no such file"),
+    ] {
+        for command in ["check", "plan", "run"] {
+            let said = here.grainscope(&[command, file]).exits(3);
+            let said = said.complains(&[file, complaint, "help: "]);
+            assert!(!said.err.contains('\u{1b}'), "{file} steers the terminal");
+        }
+    }
+    assert!(!here.has("runs"));
+}
+
+#[test]
+fn settings_that_do_not_fit_are_refused() {
+    let here = TempFolder::new();
+    for (set, complaints) in [
+        ("alpa=1", ["--set alpa=1: there is no parameter `alpa`", "did you mean `alpha`?"]),
+        ("alpha", ["--set alpha: there is no `=`", "write name=value"]),
+        ("alpha=", ["no value after `=`", "write name=value"]),
+        ("alpha=-1", ["parameter `alpha` is -1, outside its range", "0 to 100"]),
+        ("alpha=1/0", ["not finite", "division by zero"]),
+        ("materials.grain.density=1", ["no `grain` in materials", "did you mean `grains`?"]),
+        ("walls[9].kind=no_slip", ["there is no `walls[9]`", "it has 4 elements"]),
+    ] {
+        here.grainscope(&["check", "silo", "--set", set]).exits(3).complains(&complaints);
+    }
+}
