@@ -31,6 +31,8 @@ pub struct Picture {
     pub glyphs: Vec<[[f32; 2]; 2]>,
     /// Values on regular grids.
     pub fields: Vec<GridField>,
+    /// Arrows upon one of the fields.
+    pub arrows: Option<Arrows>,
     /// Level lines.
     pub isolines: Vec<Isoline>,
 }
@@ -72,6 +74,17 @@ pub struct GridField {
     pub values: Vec<f32>,
     /// Values at the two ends of the colour scale.
     pub range: [f32; 2],
+}
+
+/// Vectors at points, drawn upon a field.
+#[derive(Debug, Clone)]
+pub struct Arrows {
+    /// Name of the field.
+    pub field: String,
+    /// Where they start (m).
+    pub origins: Vec<[f32; 2]>,
+    /// As drawn: lengths are those of the picture, proportional to the vectors.
+    pub vectors: Vec<[f32; 2]>,
 }
 
 /// Lines of one level of one field.

@@ -69,6 +69,7 @@ const GAUGE: [u8; 3] = [213, 94, 0];
 const DYE: [u8; 3] = [20, 20, 30];
 const GLYPH: [u8; 3] = [10, 10, 14];
 const LINE: [u8; 3] = [20, 20, 24];
+const ARROW: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [30, 30, 34];
 
 /// Why a recording failed.
@@ -473,6 +474,17 @@ impl RerunLog {
         )?;
         for field in &picture.fields {
             self.field(field)?;
+        }
+        if let Some(arrows) = &picture.arrows {
+            expect_length("arrows", arrows.vectors.len(), arrows.origins.len())?;
+            self.rec.log(
+                self.paths.field(&arrows.field).join(&"arrows".into()),
+                &archetypes::Arrows2D::from_vectors(arrows.vectors.iter().copied())
+                    .with_origins(arrows.origins.iter().copied())
+                    .with_colors([rgb(ARROW)])
+                    .with_radii([Radius::new_ui_points(0.8)])
+                    .with_draw_order(depth::GLYPHS),
+            )?;
         }
         self.lines(&picture.isolines)
     }

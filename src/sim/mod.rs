@@ -213,7 +213,7 @@ impl<const D: usize> Simulation<D> {
         let speeds = self.speeds();
         let (dt, limiter) =
             next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.1), speeds);
-        if !(dt > 1e-12 * self.plan.clock.end) {
+        if dt.is_nan() || dt <= 1e-12 * self.plan.clock.end {
             let dt = dt * self.plan.units.time;
             return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
         }

@@ -1,7 +1,7 @@
 //! What the recording shows of a state: particles, dye, strokes, fields and level lines, in SI.
 
 use super::{Run, Simulation};
-use crate::frame::{GridField, Isoline, ParticleScalar, ParticleSnapshot, Picture};
+use crate::frame::{Arrows, GridField, Isoline, ParticleScalar, ParticleSnapshot, Picture};
 use crate::laws::director;
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName};
@@ -11,6 +11,8 @@ use crate::space::shape::Shape;
 
 /// Samples of a field along the longer side of the domain.
 const FIELD_SAMPLES: f64 = 240.0;
+/// Arrows along the longer side of the domain.
+const ARROWS: f64 = 28.0;
 /// Levels of mean |n_x| that are drawn, the first one being near the random mean 2/pi.
 const ALIGNMENT_LEVELS: [f32; 6] = [0.6, 0.5, 0.4, 0.3, 0.2, 0.1];
 
@@ -92,6 +94,7 @@ impl<const D: usize> Simulation<D> {
                 d.wrapped(&plan.mesh).iter().map(|l| l.iter().map(si).collect()).collect()
             }),
             glyphs: self.glyphs(),
+            arrows: fields.iter().any(|f| f.name == "speed").then(|| self.arrows()),
             fields,
             isolines,
         }
@@ -243,6 +246,30 @@ impl<const D: usize> Simulation<D> {
         }
         let values = sum.iter().map(|s| if s[0] > 0.0 { s[1] / s[0] } else { f64::NAN }).collect();
         Some(Coarse { raster, values })
+    }
+
+    /// Velocities on a coarse raster; the fastest is as long as the raster is wide.
+    fn arrows(&self) -> Arrows {
+        let plan = &self.plan;
+        let raster = Raster::new(plan, ARROWS);
+        let mesh = &plan.mesh;
+        let fluid = |k: &usize| !mesh.solid[mesh.locate(raster.centre(*k))];
+        let points: Vec<usize> = (0..raster.len()).filter(fluid).collect();
+        let velocities: Vec<[f64; 2]> = points
+            .iter()
+            .map(|&k| {
+                let v = self.flow.at(mesh, raster.centre(k));
+                [v[0], v[1]]
+            })
+            .collect();
+        let fastest = velocities.iter().map(|v| v[0].hypot(v[1])).fold(0.0, f64::max);
+        let scale = if fastest > 0.0 { raster.step[0].min(raster.step[1]) / fastest } else { 0.0 };
+        let si = |p: [f64; 2]| plan.si(p).map(|c| c as f32);
+        Arrows {
+            field: "speed".into(),
+            origins: points.iter().map(|&k| si(raster.centre(k))).collect(),
+            vectors: velocities.iter().map(|v| si([scale * v[0], scale * v[1]])).collect(),
+        }
     }
 
     /// Strokes along the layers' normals, evenly spaced.

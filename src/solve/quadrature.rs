@@ -248,7 +248,8 @@ impl Quadrature {
                 let points = &mut self.points[9 * cell..9 * cell + 9];
                 let fractions = &mut self.fractions[cell * self.materials..][..self.materials];
                 scratch.gather(mesh, cell, particles, materials);
-                let (viscosity, compliance) = scratch.evaluate(points, fractions, materials, &self.factors);
+                let (viscosity, compliance) =
+                    scratch.evaluate(points, fractions, materials, &self.factors);
                 self.mean_viscosity[cell] = viscosity;
                 self.compliance[cell] = compliance;
             }

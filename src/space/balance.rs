@@ -115,7 +115,7 @@ impl Balance {
         for face in &self.faces {
             let [a, b] = face.cells.map(|c| c as usize);
             let difference = self.excess[a] - self.excess[b];
-            if !(difference.abs() > SMALLEST_DIFFERENCE) {
+            if difference.is_nan() || difference.abs() < SMALLEST_DIFFERENCE {
                 continue;
             }
             let (from, to, sign) = if difference > 0.0 { (a, b, 1.0) } else { (b, a, -1.0) };

@@ -55,7 +55,7 @@ impl Axis {
         self.lines[cell + 1] - self.lines[cell]
     }
     pub fn node_coordinate(&self, node: usize) -> f64 {
-        if node % 2 == 0 {
+        if node.is_multiple_of(2) {
             self.lines[node / 2]
         } else {
             0.5 * (self.lines[node / 2] + self.lines[node / 2 + 1])

@@ -5,7 +5,8 @@ use grainscope::laws::{cosserat, director, granular, layered};
 use nalgebra::{Matrix2, Matrix4, Rotation2, Vector2, Vector4};
 
 const ETA: f64 = 1000.0;
-const ANGLES: [f64; 7] = [-1.4, -0.7, 0.0, 0.3, 0.785398, 1.1, 1.5708];
+const ANGLES: [f64; 7] =
+    [-1.4, -0.7, 0.0, 0.3, std::f64::consts::FRAC_PI_4, 1.1, std::f64::consts::FRAC_PI_2];
 
 fn unit(angle: f64) -> Vector2<f64> {
     Vector2::new(angle.cos(), angle.sin())
