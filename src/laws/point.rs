@@ -40,6 +40,11 @@ impl Sym2 {
         Sym2 { a: self.b / det, b: self.a / det, c: -self.c / det }
     }
 
+    /// Mean of the eigenvalues.
+    pub fn mean(&self) -> f64 {
+        0.5 * (self.a + self.b)
+    }
+
     /// `d.S d`
     pub fn quadratic(&self, d: [f64; 2]) -> f64 {
         self.a * d[0] * d[0] + self.b * d[1] * d[1] + 2.0 * self.c * d[0] * d[1]
@@ -61,16 +66,25 @@ pub struct PointLaw {
 
 /// How the materials that share a cell combine at an integration point.
 ///
-/// Deviatoric viscosity: harmonic, `S^-1 = sum phi_m S_m^-1`, so a cell cut by an interface
-/// shears as its weaker part allows. Dilation term: harmonic like the shear part it belongs to.
-/// Coupling and couple viscosity: arithmetic, so that the natural (moment-free) condition at
-/// the rim of a Cosserat material is the one of its own share of the cell.
+/// - Deviatoric viscosity: harmonic, `S^-1 = sum phi_m S_m^-1`, so a cell cut by an interface
+///   shears as its weaker part allows. Dilation term: harmonic like the shear it belongs to.
+/// - Coupling viscosity: arithmetic, each material weighted by its part in the shear,
+///   `eta_c = sum phi_m eta_c,m eta / eta_m`: where the weak part takes the strain, the stiff
+///   part has little spin to couple to.
+/// - Couple viscosity: arithmetic, `M = sum phi_m M_m`, so that the natural (moment-free)
+///   condition at the rim of a Cosserat material is that of its own share of the cell.
+///
+/// A plain mean of `eta_c` made a drop of Cosserat fluid fall 10 % too slowly in a fluid a
+/// thousand times thinner at 16 cells; this one errs by 2 %. A harmonic mean does better there
+/// but worse between fluids of one viscosity. `cut_cosserat_drops_converge` in the physics tests
+/// measures it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mixture {
     fluidity: Sym2,
     inverse_dilation: f64,
     dilation_share: f64,
-    coupling: f64,
+    /// `sum phi_m eta_c,m / eta_m`
+    coupling_share: f64,
     couple: f64,
 }
 
@@ -82,20 +96,21 @@ impl Mixture {
             self.inverse_dilation += phi / law.dilation;
             self.dilation_share += phi;
         }
-        self.coupling += phi * law.coupling;
+        self.coupling_share += phi * law.coupling / law.shear.mean();
         self.couple += phi * law.couple;
     }
 
     /// The law of the mixture; fractions must add up to one.
     pub fn law(&self) -> PointLaw {
+        let shear = self.fluidity.inverse();
         PointLaw {
-            shear: self.fluidity.inverse(),
+            shear,
             dilation: if self.dilation_share > 0.0 {
                 self.dilation_share * self.dilation_share / self.inverse_dilation
             } else {
                 0.0
             },
-            coupling: self.coupling,
+            coupling: self.coupling_share * shear.mean(),
             couple: self.couple,
         }
     }

@@ -166,6 +166,9 @@ impl Quadrature {
                     EmptyCell { cell, x, y }
                 })?
             };
+            // Particles as integration points move: their matrix is never the one before.
+            let moving = self.rule == Rule::Particles && !particles.of_cell(cell).is_empty();
+            let content = if moving { Content::Mixed } else { content };
             let unchanged = content != Content::Mixed && content == self.content[cell];
             self.content[cell] = content;
             match self.rule {
