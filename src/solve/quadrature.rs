@@ -304,7 +304,33 @@ impl Quadrature {
             let r = mesh.to_reference(cell, particles.position[p]);
             self.points.push(IntegrationPoint { law: m.law(eta, &texture), density, weight, r });
         }
+        self.hold_rotation(cell, materials);
         self.start[cell + 1] = self.points.len() as u32;
+    }
+
+    /// Few particles of a Cosserat material leave its rotation undetermined in a cut cell: a
+    /// billionth of its law at the Gauss points holds it.
+    fn hold_rotation(&mut self, cell: usize, materials: &[Material]) {
+        const HOLD: f64 = 1e-9;
+        if self.content[cell] != Content::Mixed {
+            return;
+        }
+        for (m, material) in materials.iter().enumerate() {
+            let Some(rotation) = material.rotation else { continue };
+            if self.fractions[cell * self.materials + m] > 0.0 {
+                let law = PointLaw {
+                    coupling: HOLD * rotation.coupling,
+                    couple: HOLD * rotation.couple,
+                    ..PointLaw::default()
+                };
+                self.points.extend(GAUSS_3X3.iter().map(|g| IntegrationPoint {
+                    law,
+                    density: 0.0,
+                    weight: g.weight,
+                    r: g.r,
+                }));
+            }
+        }
     }
 }
 

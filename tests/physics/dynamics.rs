@@ -177,7 +177,7 @@ fn discharge_orders_in_alpha_and_levels_off() {
 #[test]
 fn five_alphas_discharge_in_order_to_the_last_snapshot() {
     let volume = |alpha: &str| {
-        let mut run = preset("silo", &[alpha, "accuracy.cells=6", "recording.frames=1"]);
+        let mut run = preset("silo", &[alpha, "accuracy.cells=5", "recording.frames=1"]);
         let first = run.row().potential_energy;
         finish(run.as_mut(), |_| {});
         let row = run.row();
@@ -194,18 +194,25 @@ fn five_alphas_discharge_in_order_to_the_last_snapshot() {
 }
 
 #[test]
-fn the_plain_method_of_the_source_gives_nearly_the_same_discharge() {
-    let rate = |quadrature: &str| {
+fn the_plain_method_of_the_source_agrees_in_whole_cells_and_is_stiffer_in_cut_ones() {
+    let rates = |quadrature: &str| {
         let sets = ["accuracy.cells=6", "mesh.grading=[]", quadrature];
         let mut run = preset("silo", &sets);
+        let first = run.row().gauges[0].rate;
         for _ in 0..10 {
             run.step().unwrap();
+            assert!(run.row().power_error < 1e-8);
         }
-        run.row().gauges[0].rate
+        [first, run.row().gauges[0].rate]
     };
-    let (ours, plain) =
-        (rate("accuracy.quadrature=mixture"), rate("accuracy.quadrature=particles"));
-    assert!(ours != plain && (plain / ours - 1.0).abs() < 0.03, "{ours} {plain}");
+    let ours = rates("accuracy.quadrature=mixture");
+    let plain = rates("accuracy.quadrature=particles");
+    println!("ours {ours:?}, plain {plain:?}");
+    // At first no cell is cut, and 4 x 4 regular points integrate well.
+    // Its error is that of the points at the singular lips: 1.6 %.
+    assert!((plain[0] / ours[0] - 1.0).abs() < 0.025, "{ours:?} {plain:?}");
+    // Then particles see the stiffer material of a cut cell in full.
+    assert!(plain[1] < ours[1] && plain[1] > 0.8 * ours[1], "{ours:?} {plain:?}");
 }
 
 #[test]
