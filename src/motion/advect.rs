@@ -7,7 +7,7 @@ use crate::space::particles::Particles;
 use crate::space::population::Count;
 
 /// Moves all particles through a step. `particles` must be sorted; they are not afterwards.
-/// `compliant[m]`: volumes of material `m` follow the flow.
+/// `compliant[m]`: volumes of material `m` follow the flow, and its particles keep their mass.
 pub fn advance(
     carrier: &Carrier,
     particles: &mut Particles,
@@ -36,7 +36,11 @@ pub fn advance(
                     director[p] = carrier.turn(director[p], &l);
                 }
                 if compliant[material as usize] {
-                    particles.volume[p] *= (l.trace() * carrier.dt).exp();
+                    let stretch = (l.trace() * carrier.dt).exp();
+                    particles.volume[p] *= stretch;
+                    if let Some(density) = &mut particles.density {
+                        density[p] /= stretch;
+                    }
                 }
             }
             match journey.to {

@@ -389,12 +389,18 @@ impl SiMaterial {
             warnings.push(Warning::StiffLayers { material: name.into(), ratio: eta_s / range[0] });
         }
         let varying = |f: FieldFn| f.constant().is_none().then_some(f);
+        // A particle that changes its volume keeps its mass: it carries its own density.
+        let density_field = if bulk.is_some() && density_range != [0.0; 2] {
+            Some(density)
+        } else {
+            varying(density)
+        };
         let out = SiMaterial {
             name: name.into(),
             viscosity: range[1],
             density: density_range[1].max(0.0),
             viscosity_field: varying(shear),
-            density_field: varying(density),
+            density_field,
             compliance: bulk.map_or(0.0, |b| 1.0 / b),
             rotation,
             layer_viscosity: layer,

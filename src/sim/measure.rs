@@ -101,14 +101,18 @@ impl<const D: usize> Simulation<D> {
         speeds
     }
 
-    pub(super) fn projected_volumes(&self) -> Vec<f64> {
-        (0..self.matter.materials.len())
-            .map(|m| self.quadrature.projected_area(&self.plan.mesh, m))
-            .collect()
+    /// Projected area of each material over the volume of its particles.
+    pub(super) fn projected_shares(&self) -> Vec<f64> {
+        let volumes = self.particles.volumes(self.matter.materials.len());
+        let share = |(m, &volume): (usize, &f64)| {
+            let area = self.quadrature.projected_area(&self.plan.mesh, m);
+            if volume > 0.0 { area / volume } else { 0.0 }
+        };
+        volumes.iter().enumerate().map(share).collect()
     }
 
     /// Of the particles in gravity, less what the background would have in their place.
-    fn potential_energy(&self) -> f64 {
+    pub(super) fn potential_energy(&self) -> f64 {
         let p = &self.particles;
         let ground =
             self.plan.background().map_or(0.0, |b| self.matter.materials[b as usize].density);
@@ -180,7 +184,7 @@ impl<const D: usize> Simulation<D> {
         let work = trapezoid(before.work, self.last_other_power, other);
         let larger = power_in.abs().max(dissipation.abs()).max(REST * r.load_scale * u.power());
         let drift = self
-            .projected_volumes()
+            .projected_shares()
             .iter()
             .zip(&self.baseline)
             .map(|(now, start)| if *start > 0.0 { now / start - 1.0 } else { 0.0 })

@@ -108,7 +108,7 @@ pub struct Simulation<const D: usize> {
     count: Count,
     time: f64,
     step: u64,
-    /// Projected volumes at the start.
+    /// Projected areas over particle volumes at the start.
     baseline: Vec<f64>,
     last_other_power: f64,
     row: Row,
@@ -194,7 +194,7 @@ impl<const D: usize> Simulation<D> {
         sim.apply_changes();
         let mut seconds = Phases::default();
         sim.solve(&mut seconds)?;
-        sim.baseline = sim.projected_volumes();
+        sim.baseline = sim.projected_shares();
         sim.measure(0.0, Limiter::Start, seconds, sim.report.corrections, clock);
         Ok(sim)
     }
@@ -323,7 +323,8 @@ impl<const D: usize> Simulation<D> {
     fn apply_changes(&mut self) -> bool {
         self.events.clear();
         let mut any = false;
-        while let Some(change) = self.plan.changes.get(self.next_change) {
+        let plan = self.plan.clone();
+        while let Some(change) = plan.changes.get(self.next_change) {
             let due = match change.when {
                 When::Time(t) => t <= self.time * (1.0 + 1e-14),
                 When::Step(s) => s <= self.step,
@@ -331,7 +332,11 @@ impl<const D: usize> Simulation<D> {
             if !due {
                 break;
             }
+            let before = self.potential_energy();
             self.matter = change.state.clone();
+            // A change of gravity does work on everything at once.
+            let jump = self.potential_energy() - before;
+            self.row.work += jump * self.plan.units.energy();
             self.events.push(format!("step {}: {}", self.step, change.label));
             self.version += 1;
             self.next_change += 1;

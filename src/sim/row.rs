@@ -31,7 +31,8 @@ pub struct Row {
     pub max_speed: f64,
     /// Of the particles in gravity, less the background's, J/m.
     pub potential_energy: f64,
-    /// Time integral of the power of everything but gravity, J/m.
+    /// Time integral of the power of everything but gravity, and what scheduled changes of gravity
+    /// add, J/m.
     pub work: f64,
     /// Time integral of the dissipation, J/m.
     pub dissipated: f64,
@@ -45,7 +46,8 @@ pub struct Row {
     pub merges: u64,
     pub held: u64,
     pub gauges: Vec<GaugeRow>,
-    /// Change of each material's projected volume since the start, relative.
+    /// Relative change since the start of each material's projected area over the volume of its
+    /// particles, which is exact.
     pub drift: Vec<f64>,
     pub seconds: Phases,
 }
