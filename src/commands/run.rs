@@ -255,7 +255,22 @@ impl Session {
         }
     }
 
-    fn compute(&mut self, mut progress: impl FnMut(u64, f64)) -> Result<Ending, Failure> {
+    fn compute(&mut self, progress: impl FnMut(u64, f64)) -> Result<Ending, Failure> {
+        let outcome = self.steps(progress);
+        // A run that ends between two frames still shows where it ended.
+        if let (Ok(Ending::StepLimit | Ending::Interrupted), Some(logger)) =
+            (&outcome, &mut self.logger)
+        {
+            let wall = self.clock.elapsed().as_secs_f64();
+            let picture = Some(self.run.picture());
+            let frame = info::frame(&self.plan, self.run.row(), wall, picture, vec![]);
+            // A logger that is gone says why when it is closed.
+            let _ = logger.send(frame);
+        }
+        outcome
+    }
+
+    fn steps(&mut self, mut progress: impl FnMut(u64, f64)) -> Result<Ending, Failure> {
         self.observe(vec![])?;
         while !self.run.is_finished() {
             if self.interrupted.load(Ordering::SeqCst) {
@@ -355,7 +370,7 @@ impl Session {
         let path = self.folder.join("summary.json");
         std::fs::write(&path, format!("{json}\n"))
             .map_err(|e| Failure::Environment(format!("cannot write {}: {e}", path.display())))?;
-        self.plot()?;
+        let plotted = self.plot();
         if self.json {
             print(&json)?;
         } else {
@@ -367,7 +382,7 @@ impl Session {
                 std::thread::sleep(std::time::Duration::from_millis(100));
             }
         }
-        failure.map_or(Ok(()), Err)
+        failure.map_or(plotted, Err)
     }
 
     fn plot(&self) -> Result<(), Failure> {
@@ -449,9 +464,9 @@ impl Session {
         }
         let drift = s.volume_drift.values().map(|d| d.abs()).fold(0.0, f64::max);
         out += &format!(
-            "  balances: power {:.1e}, energy {:.1e}, divergence {:.1e}, volume drift {drift:.1e}\n",
+            "  balances: power {:.1e}, energy {}, divergence {:.1e}, volume drift {drift:.1e}\n",
             s.balances.power_error,
-            s.balances.energy_error.abs(),
+            s.balances.energy_error.map_or("-".into(), |e| format!("{:.1e}", e.abs())),
             s.balances.divergence_error
         );
         if self.profile {

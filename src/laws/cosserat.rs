@@ -41,8 +41,3 @@ pub fn viscosity(eta: f64, eta_c: f64, b: f64) -> Matrix4<f64> {
 pub fn couple_viscosity(eta_c: f64, r: f64) -> f64 {
     2.0 * eta_c * r * r
 }
-
-/// Internal length `R = sqrt(M / (2 eta_c))`, m.
-pub fn internal_length(eta_c: f64, m: f64) -> f64 {
-    (m / (2.0 * eta_c)).sqrt()
-}

@@ -9,8 +9,6 @@
 //! `2 eta D:D`, the form used for incompressible materials; a finite bulk viscosity has
 //! `beta = 0` and enters through the pressure.
 
-use nalgebra::Matrix2;
-
 /// Symmetric 2x2 matrix `[[a, c], [c, b]]` on the deviatoric rates, Pa s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sym2 {
@@ -22,10 +20,6 @@ pub struct Sym2 {
 impl Sym2 {
     pub fn isotropic(eta: f64) -> Self {
         Sym2 { a: eta, b: eta, c: 0.0 }
-    }
-
-    pub fn from_matrix(m: &Matrix2<f64>) -> Self {
-        Sym2 { a: m[(0, 0)], b: m[(1, 1)], c: m[(0, 1)] }
     }
 
     pub fn add_scaled(&mut self, f: f64, o: &Sym2) {

@@ -43,14 +43,13 @@ pub fn advance(
                     }
                 }
             }
-            match journey.to {
-                Some(to) => {
-                    for gauge in gauges.iter_mut() {
-                        gauge.pass(mesh, from, to, material, volume);
-                    }
-                    particles.position[p] = mesh.wrap(to);
-                }
-                None => left.push(p),
+            for gauge in gauges.iter_mut() {
+                gauge.pass(mesh, from, journey.to, material, volume);
+            }
+            if journey.left {
+                left.push(p);
+            } else {
+                particles.position[p] = mesh.wrap(journey.to);
             }
         }
     }

@@ -18,8 +18,10 @@ pub struct Carrier<'a> {
 
 /// Where a point goes in a step.
 pub struct Journey {
-    /// End of the step, not wrapped around periodic sides; `None` if it left the domain.
-    pub to: Option<[f64; 2]>,
+    /// End of the step, not wrapped around periodic sides.
+    pub to: [f64; 2],
+    /// It left the domain through an open side.
+    pub left: bool,
     /// A wall held it back.
     pub held: bool,
     /// Cell and reference coordinates of its middle.
@@ -80,14 +82,14 @@ impl Carrier<'_> {
         let goal = [p[0] + dt * mean(0), p[1] + dt * mean(1)];
         let r = self.mesh.to_reference(home.cell, goal);
         if r[0].abs() < 1.0 && r[1].abs() < 1.0 {
-            return Journey { to: Some(goal), held: false, middle };
+            return Journey { to: goal, left: false, held: false, middle };
         }
-        let (to, held) = match self.enclosure.follow(self.mesh, p, goal) {
-            Landing::Free(q) => (Some(q), false),
-            Landing::Held(q) => (Some(q), true),
-            Landing::Left => (None, false),
+        let (to, left, held) = match self.enclosure.follow(self.mesh, p, goal) {
+            Landing::Free(q) => (q, false, false),
+            Landing::Held(q) => (q, false, true),
+            Landing::Left => (goal, true, false),
         };
-        Journey { to, held, middle }
+        Journey { to, left, held, middle }
     }
 
     /// Velocity gradient at the middle of a journey.

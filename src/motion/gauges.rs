@@ -53,7 +53,7 @@ impl Counter {
     pub fn exchange(&mut self, face: &Face, material: u8, volume: f64) {
         let g = &self.gauge;
         let on = face.normal == g.normal
-            && face.at == g.at
+            && face.at.contains(&g.at)
             && face.middle > g.from
             && face.middle < g.to;
         if on && material == g.material {

@@ -34,13 +34,9 @@ impl DyeLines {
             line.retain_mut(|p| {
                 let inside = mesh.wrap(*p);
                 let offset = [p[0] - inside[0], p[1] - inside[1]];
-                match carrier.travel(&carrier.home(mesh.locate(inside)), inside).to {
-                    Some(q) => {
-                        *p = [q[0] + offset[0], q[1] + offset[1]];
-                        true
-                    }
-                    None => false,
-                }
+                let journey = carrier.travel(&carrier.home(mesh.locate(inside)), inside);
+                *p = [journey.to[0] + offset[0], journey.to[1] + offset[1]];
+                !journey.left
             });
         }
         let mut room = MAX_POINTS.saturating_sub(self.points());

@@ -63,9 +63,10 @@ fn side_nodes(mesh: &Mesh, side: usize) -> Vec<usize> {
 
 impl WallLine {
     fn nodes<'a>(&'a self, mesh: &'a Mesh) -> impl Iterator<Item = usize> + 'a {
+        // A wall may end on the seam of a periodic axis.
         (self.from..=self.to).map(|k| match self.normal {
-            0 => mesh.node(self.line, k),
-            _ => mesh.node(k, self.line),
+            0 => mesh.node(self.line, k % mesh.y.nodes()),
+            _ => mesh.node(k % mesh.x.nodes(), self.line),
         })
     }
 }

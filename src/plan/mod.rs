@@ -19,7 +19,7 @@ pub use resolve::{MAX_MATERIALS, resolve};
 pub use units::Units;
 pub use warning::Warning;
 
-use crate::scene::{ColourBy, Direction, FieldFn, FieldName, Integrator, Quadrature, Scene};
+use crate::scene::{ColourBy, FieldFn, FieldName, Integrator, Quadrature, Scene};
 use crate::space::mesh::Mesh;
 use crate::space::seeding::Seeding;
 use crate::space::walls::Enclosure;
@@ -128,7 +128,7 @@ pub enum InitialDirector {
 }
 
 /// Fields of one material at the start, SI values and coordinates.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct InitialFields {
     pub viscosity: Option<FieldFn>,
     pub density: Option<FieldFn>,
@@ -145,7 +145,6 @@ pub struct Gauge {
     pub to: f64,
     /// +1 or -1 along the normal.
     pub sign: f64,
-    pub direction: Direction,
     pub material: u8,
 }
 

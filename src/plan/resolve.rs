@@ -7,8 +7,8 @@ use super::units::power_of_two;
 use super::*;
 use crate::laws::{cosserat, granular};
 use crate::scene::{
-    self, BoundaryKind, Change, Field, GradingTarget, Quantity, SceneError, Scope, Shape, WallKind,
-    closest,
+    self, BoundaryKind, Change, Direction, Field, GradingTarget, Quantity, SceneError, Scope,
+    Shape, WallKind, closest,
 };
 use crate::space::mesh::Axis;
 use crate::space::walls::Obstacle;
@@ -18,6 +18,8 @@ use indexmap::IndexMap;
 pub const MAX_MATERIALS: usize = 16;
 /// Most cells along a side: beyond it a scene needs more memory than any machine here has.
 const MAX_CELLS: usize = 4096;
+/// Most cells in all: about 10 kB each with the factor.
+const MAX_TOTAL_CELLS: usize = 1_000_000;
 /// Okabe-Ito colours, told apart by colour-blind readers; first the usual background grey.
 const PALETTE: [[u8; 3]; 8] = [
     [230, 159, 0],
@@ -55,25 +57,30 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
         let other = resolve_without_schedule(&current)?;
         let units = plan.units;
         let state = Si::new(&current, &scope)?.matter(&units);
-        if other.mesh.x.lines().len() != plan.mesh.x.lines().len()
-            || geometry(&other) != geometry(&plan)
+        if geometry(&other) != geometry(&plan)
             || other.effects != plan.effects
+            || other.initial != plan.initial
+            || !same_history(&other.state, &plan.state)
+            || loads(&other) != loads(&plan)
         {
             return Err(SceneError::new(
                 format!(
-                    "schedule[{index}] changes the mesh or the set of solved effects, not only \
-                     materials and gravity"
+                    "schedule[{index}] changes more than constant material values and gravity: \
+                     mesh, boundaries, loads, the set of solved effects, or what particles carry"
                 ),
                 "such a change needs a run of its own",
             ));
         }
-        if let (When::Time(t), Some(PlannedChange { when: When::Time(before), .. })) =
-            (when, plan.changes.last())
-            && t < *before
-        {
+        let in_order = match (plan.changes.last().map(|c| c.when), when) {
+            (None, _) => true,
+            (Some(When::Time(before)), When::Time(now)) => before <= now,
+            (Some(When::Step(before)), When::Step(now)) => before <= now,
+            _ => false,
+        };
+        if !in_order {
             return Err(SceneError::new(
-                format!("schedule[{index}] comes before the entry above it"),
-                "order [[schedule]] by time",
+                format!("schedule[{index}] does not come after the entry above it"),
+                "order [[schedule]], all entries by time or all by step",
             ));
         }
         let label =
@@ -88,7 +95,8 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
         }
     }
     plan.clock.stops.sort_by(f64::total_cmp);
-    plan.clock.stops.dedup();
+    let least = 1e-9 * plan.clock.end;
+    plan.clock.stops.dedup_by(|b, a| *b - *a < least);
     Ok(plan)
 }
 
@@ -103,6 +111,32 @@ fn geometry(p: &Plan) -> (Vec<f64>, Vec<[f64; 2]>) {
         .flat_map(|o| [[o.at * l, o.normal as f64], [o.from * l, o.to * l]])
         .collect();
     (lines, walls)
+}
+
+/// Materials carry the same columns and have the same kind of law.
+fn same_history(a: &Matter, b: &Matter) -> bool {
+    let kind = |m: &Material| {
+        (m.carries_viscosity, m.carries_density, m.layer_viscosity.is_some(), m.rotation.is_some())
+    };
+    a.materials.iter().map(kind).eq(b.materials.iter().map(kind))
+}
+
+/// Given nodal values and fixed loads in SI units.
+fn loads(p: &Plan) -> Vec<f64> {
+    let (mesh, units) = (&p.mesh, &p.units);
+    let given = p.boundary.constraints::<3>(mesh, units);
+    let mut load = vec![[0.0; 3]; mesh.nodes()];
+    p.boundary.add_tractions(mesh, units, &mut load);
+    if let Some(f) = &p.body_force {
+        add_body_force(mesh, units, f, &mut load);
+    }
+    let force = units.stress() * units.length;
+    let scale = [units.velocity(), units.velocity(), units.rate()];
+    let mut out: Vec<f64> = load.iter().flatten().map(|f| f * force).collect();
+    for node in 0..mesh.nodes() {
+        out.extend((0..3).filter_map(|c| Some(given.fixed_value(node, c)? * scale[c])));
+    }
+    out
 }
 
 /// Sets parameters, material values and gravity of a scene.
@@ -369,7 +403,9 @@ impl SiMaterial {
             }
         };
         let rotation = (coupling > 0.0 && couple > 0.0).then_some(CosseratLaw { coupling, couple });
-        if coupling > 0.0 && couple == 0.0 && m.internal_length.is_none() {
+        let length_alone =
+            coupling == 0.0 && m.internal_length.is_some() && m.coupling_viscosity.is_none();
+        if length_alone || coupling > 0.0 && couple == 0.0 && m.internal_length.is_none() {
             warnings.push(Warning::NoInternalLength { material: name.into() });
         }
         let bulk = match (&m.bulk_viscosity, contacts, &m.granular) {
@@ -415,8 +451,8 @@ impl SiMaterial {
         {
             return Err(SceneError::new(
                 format!("the background `{name}` carries a history"),
-                "a background has no particles of its own: constant density and viscosity, \
-                 incompressible, no layers, no internal length; else set background = false",
+                "a background has no history: constant density and viscosity, incompressible, no \
+                 layers, no internal length; else set background = false",
             ));
         }
         Ok(out)
@@ -466,6 +502,13 @@ fn choose_units(
 }
 
 fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
+    let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if scene.name.is_empty() || scene.name.len() > 100 || !scene.name.chars().all(ordinary) {
+        return Err(SceneError::new(
+            format!("the scene's name is {:?}", scene.name),
+            "it names folders: use 1 to 100 letters, digits, `_` and `-`",
+        ));
+    }
     let scope = &Scope::new(scene)?;
     let (x, y) = (pair(&scene.domain.x, scope)?, pair(&scene.domain.y, scope)?);
     for (name, range, q) in [("x", x, &scene.domain.x), ("y", y, &scene.domain.y)] {
@@ -491,8 +534,17 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
     let gauges = gauges(scene, scope, domain)?;
     let mesh = Arc::new(mesh(scene, scope, domain, length, &walls, &gauges, &units)?);
     let sides = sides(scene, scope, domain)?;
-    let boundary = boundary(scene, sides, &walls, &mesh, &units, &state)?;
-    let enclosure = walls.enclosure(scene, &mesh, &units);
+    let boundary = boundary(sides, &walls, &mesh, &units, &state)?;
+    let mut enclosure = walls.enclosure(scene, &mesh, &units);
+    for (s, side) in boundary.sides.iter().enumerate() {
+        let through =
+            side.velocity[side_normal(s)].as_ref().is_some_and(|f| f.constant() != Some(0.0));
+        // What flows out takes its particles along.
+        enclosure.open[s] |= through;
+        if through {
+            warnings.push(Warning::ThroughFlow { place: format!("boundaries.{}", SIDES[s]) });
+        }
+    }
 
     let regions = regions(scene, scope, domain, &si, &mut warnings)?;
     let effects = EffectSet {
@@ -741,7 +793,6 @@ impl SiGauge {
                 Direction::Right | Direction::Up => 1.0,
                 Direction::Left | Direction::Down => -1.0,
             },
-            direction: self.direction,
             material: self.material,
         }
     }
@@ -903,6 +954,14 @@ fn mesh(
     let y = axes.pop();
     let x = axes.pop();
     let (Some(x), Some(y)) = (x, y) else { unreachable!("two axes were made") };
+    if x.cells() * y.cells() > MAX_TOTAL_CELLS {
+        return Err(SceneError::new(
+            format!("the mesh would have {} x {} cells", x.cells(), y.cells()),
+            format!(
+                "lower accuracy.cells or the grading: at most {MAX_TOTAL_CELLS} cells fit into memory"
+            ),
+        ));
+    }
     let mut mesh = Mesh::new(x, y);
     for cell in 0..mesh.cells() {
         let [px, py] = mesh.cell_centre(cell).map(|v| v * units.length);
@@ -1034,7 +1093,6 @@ fn sides(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<[Side; 4
 }
 
 fn boundary(
-    scene: &Scene,
     sides: [Side; 4],
     walls: &Walls,
     mesh: &Mesh,
@@ -1051,7 +1109,7 @@ fn boundary(
             normal,
             line: wrap(across, node(across, at)),
             from: node(axis, along[0]),
-            to: node(axis, along[1]).min(axis.nodes() - 1),
+            to: node(axis, along[1]),
             no_slip: kind == WallKind::NoSlip,
             rotation,
         });
@@ -1090,7 +1148,6 @@ fn boundary(
             ));
         }
     }
-    let _ = scene;
     Ok(plan)
 }
 

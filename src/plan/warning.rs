@@ -23,8 +23,8 @@ pub enum Warning {
     DyeCoarse { points: usize },
     /// Cells that had lost all particles were refilled.
     CellsHealed { count: u64 },
-    /// Particles were held back at walls.
-    ParticlesHeld { count: u64 },
+    /// A side has a given velocity through it.
+    ThroughFlow { place: String },
 }
 
 impl fmt::Display for Warning {
@@ -42,8 +42,8 @@ impl fmt::Display for Warning {
             ),
             Warning::NoInternalLength { material } => write!(
                 f,
-                "material `{material}` has a coupling viscosity but no internal length: no \
-                 rotation is solved for it; give internal_length (or couple_viscosity) above zero"
+                "material `{material}` has only one of coupling_viscosity and internal_length: no \
+                 rotation is solved for it; give both above zero, or neither"
             ),
             Warning::RotationUnused { place } => write!(
                 f,
@@ -71,10 +71,11 @@ impl fmt::Display for Warning {
                 "{count} cells lost all their particles and were refilled from neighbours; \
                  lower time.courant or raise accuracy.particles_per_cell"
             ),
-            Warning::ParticlesHeld { count } => write!(
+            Warning::ThroughFlow { place } => write!(
                 f,
-                "{count} particle steps would have crossed a wall and were held; \
-                 lower time.courant if that is many"
+                "{place} prescribes a velocity through it: particles leave with the flow, but what \
+                 flows in brings none, and those near it are split to fill in; read long runs \
+                 with care, or use periodic sides"
             ),
         }
     }

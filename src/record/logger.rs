@@ -34,8 +34,9 @@ pub struct Traffic {
 pub struct Logger {
     policy: Backpressure,
     sender: Sender<Frame>,
-    /// The other end, to take the oldest frame out.
-    oldest: Receiver<Frame>,
+    /// The other end, to take the oldest frame out; only for [`Backpressure::DropOldest`], since
+    /// the channel never closes while it exists.
+    oldest: Option<Receiver<Frame>>,
     thread: JoinHandle<Result<Finished, RecordError>>,
     busy_ns: Arc<AtomicU64>,
     traffic: Traffic,
@@ -49,25 +50,19 @@ impl Logger {
     /// Starts the thread on an open recording.
     pub fn start(log: RerunLog, policy: Backpressure) -> std::io::Result<Logger> {
         let (sender, receiver) = bounded::<Frame>(CAPACITY);
-        let oldest = receiver.clone();
+        let oldest = (policy == Backpressure::DropOldest).then(|| receiver.clone());
         let busy_ns = Arc::new(AtomicU64::new(0));
         let busy = busy_ns.clone();
         let thread = std::thread::Builder::new().name("logger".into()).spawn(move || {
             let mut log = log;
-            // Ends when the sender is dropped; after a fault frames are only drained, so that
-            // the simulation never blocks on a dead logger.
-            let mut fault = None;
+            // Ends when the sender is dropped. A fault ends it at once and closes the channel: the
+            // simulation hears of it with its next frame.
             for frame in receiver {
                 let clock = Instant::now();
-                if fault.is_none() {
-                    fault = log.frame(&frame).err();
-                }
+                log.frame(&frame)?;
                 busy.fetch_add(clock.elapsed().as_nanos() as u64, Ordering::Relaxed);
             }
-            match fault {
-                Some(e) => Err(e),
-                None => log.finish(),
-            }
+            log.finish()
         })?;
         Ok(Logger { policy, sender, oldest, thread, busy_ns, traffic: Traffic::default() })
     }
@@ -86,7 +81,11 @@ impl Logger {
                     sent
                 }
                 Backpressure::DropOldest => loop {
-                    if self.oldest.try_recv().is_ok() {
+                    // With the other end in our hands the channel stays open: ask the thread.
+                    if self.thread.is_finished() {
+                        return Err(LoggerGone);
+                    }
+                    if self.oldest.as_ref().is_some_and(|o| o.try_recv().is_ok()) {
                         self.traffic.drops += 1;
                     }
                     match self.sender.try_send(frame) {

@@ -9,6 +9,8 @@ use std::path::Path;
 /// The table in the making; each row is flushed, so a killed run leaves whole rows.
 pub struct SeriesWriter {
     out: BufWriter<File>,
+    /// There is a column of the mean alignment.
+    alignment: bool,
 }
 
 /// Names of the columns of a plan's series.
@@ -60,7 +62,7 @@ impl SeriesWriter {
         let mut out = BufWriter::new(File::create(path)?);
         writeln!(out, "{}", columns(plan).join(","))?;
         out.flush()?;
-        Ok(SeriesWriter { out })
+        Ok(SeriesWriter { out, alignment: plan.effects.directors })
     }
 
     pub fn write(&mut self, row: &Row) -> std::io::Result<()> {
@@ -94,8 +96,8 @@ impl SeriesWriter {
             row.merges,
             row.held
         );
-        if let Some(a) = row.alignment {
-            line += &format!(",{a}");
+        if self.alignment {
+            line += &format!(",{}", row.alignment.unwrap_or(f64::NAN));
         }
         for d in &row.drift {
             line += &format!(",{d:e}");

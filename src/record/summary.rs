@@ -69,8 +69,9 @@ pub struct Balances {
     pub volume_error: f64,
     pub director_error: f64,
     /// Potential energy lost plus work done by other loads, less what was dissipated, over the
-    /// latter: sees quadrature, advection and time stepping.
-    pub energy_error: f64,
+    /// latter: sees quadrature, advection and time stepping. Absent where particles' potential
+    /// energy does not tell: gravity along a periodic axis, open sides.
+    pub energy_error: Option<f64>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -112,6 +113,9 @@ impl Summary {
         let known: f64 = seconds.values().sum();
         seconds.insert("other", (tally.wall - known).max(0.0));
         seconds.insert("total", tally.wall);
+        let (mesh, g) = (&plan.mesh, plan.state.gravity);
+        let along_seam = mesh.x.periodic() && g[0] != 0.0 || mesh.y.periodic() && g[1] != 0.0;
+        let energy_tells = !along_seam && !plan.enclosure.open.contains(&true);
         let lost = tally.first_energy - row.potential_energy + row.work;
         Summary {
             schema: SCHEMA,
@@ -151,11 +155,11 @@ impl Summary {
                 divergence_error: tally.largest_divergence,
                 volume_error: row.volume_error,
                 director_error: row.director_error,
-                energy_error: {
+                energy_error: energy_tells.then(|| {
                     // Less than this share of the energy there is, is rounding: the scene is at rest.
                     let scale = row.dissipated.max(1e-6 * tally.first_energy.abs());
                     if scale > 0.0 { (lost - row.dissipated) / scale } else { 0.0 }
-                },
+                }),
             },
             population: [
                 ("splits", count.splits),

@@ -3,9 +3,10 @@
 //! ```text
 //! choose dt                    named limiters
 //! velocity of the half step    extrapolated from two solutions, or solved for
-//! move particles, dye          explicit midpoint; walls hold, gauges count
+//! move particles, dye          Runge-Kutta in the frozen field; walls hold, gauges count
 //! turn directors               exact map of the step's velocity gradient
 //! control the population       no cell empty or overfull
+//! balance volumes              a cell's particles fill it (incompressible scenes)
 //! integration points           local harmonic mixture of each cell's particles
 //! solve                        velocity, rotation, pressure
 //! ```
@@ -158,7 +159,7 @@ impl<const D: usize> Simulation<D> {
         let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
         let stokes = Stokes::new(mesh.clone(), constraints)?;
         let mut particles = initial::particles(&plan)?;
-        let population = Population { seeding: plan.method.seeding };
+        let population = Population::new(&mesh, &plan.enclosure, plan.method.seeding);
         let mut count = Count::default();
         population.control(&mesh, &mut particles, &mut count);
         let mut fixed_load = vec![[0.0; D]; mesh.nodes()];
@@ -213,7 +214,7 @@ impl<const D: usize> Simulation<D> {
         let speeds = self.speeds();
         let (dt, limiter) =
             next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.1), speeds);
-        if dt.is_nan() || dt <= 1e-12 * self.plan.clock.end {
+        if dt.is_nan() || self.time + dt <= self.time {
             let dt = dt * self.plan.units.time;
             return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
         }
@@ -221,8 +222,7 @@ impl<const D: usize> Simulation<D> {
 
         let phase = Instant::now();
         let plan = self.plan.clone();
-        let compliant: Vec<bool> =
-            self.matter.materials.iter().map(|m| m.compliance > 0.0).collect();
+        let compliant = self.compliant();
         let carrier = Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &half, dt };
         advect::advance(
             &carrier,
@@ -256,6 +256,11 @@ impl<const D: usize> Simulation<D> {
         self.previous = (!changed).then_some((before, dt));
         self.measure(dt, limiter, seconds, extra + self.report.corrections, clock);
         Ok(())
+    }
+
+    /// Materials whose particles change their volume.
+    fn compliant(&self) -> Vec<bool> {
+        self.matter.materials.iter().map(|m| m.compliance > 0.0).collect()
     }
 
     fn si_time(&self) -> f64 {
@@ -302,7 +307,7 @@ impl<const D: usize> Simulation<D> {
         let plan = self.plan.clone();
         let phase = Instant::now();
         let mut ahead = self.particles.clone();
-        let compliant = vec![false; self.matter.materials.len()];
+        let compliant = self.compliant();
         let carrier =
             Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &now, dt: 0.5 * dt };
         let mut ignored = Count::default();

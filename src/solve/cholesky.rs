@@ -75,10 +75,6 @@ impl SparseCholesky {
     pub fn unknowns(&self) -> usize {
         self.col_ptr.len() - 1
     }
-    /// Stored entries of the factor.
-    pub fn factor_entries(&self) -> usize {
-        self.factor.len()
-    }
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }

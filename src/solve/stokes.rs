@@ -206,10 +206,6 @@ impl<const D: usize> Stokes<D> {
     pub fn unknowns(&self) -> usize {
         self.mesh.nodes() * D
     }
-    pub fn factor_entries(&self) -> usize {
-        self.matrix.factor_entries()
-    }
-
     /// Solves for `flow`, starting from what it holds. `load` is the force (and couple) at each
     /// node.
     pub fn solve(

@@ -33,8 +33,10 @@ pub struct Face {
     pub cells: [u32; 2],
     /// 0: the face is vertical; 1: horizontal.
     pub normal: usize,
-    /// Coordinate of the face along its normal, and of its middle along itself.
-    pub at: f64,
+    /// Coordinate of the face along its normal, as its two cells see it: they differ at the seam
+    /// of a periodic axis.
+    pub at: [f64; 2],
+    /// Of its middle, along itself.
     pub middle: f64,
 }
 
@@ -53,12 +55,11 @@ pub fn open_faces(mesh: &Mesh, enclosure: &Enclosure) -> Vec<Face> {
                 continue;
             };
             let other = if normal == 0 { mesh.cell(next, j) } else { mesh.cell(i, next) };
-            let at = axis.lines()[k + 1];
+            let at = [axis.lines()[k + 1], axis.lines()[next]];
             let middle = mesh.cell_centre(cell)[1 - normal];
-            let walled = enclosure
-                .obstacles
-                .iter()
-                .any(|o| o.normal == normal && o.at == at && middle > o.from && middle < o.to);
+            let walled = enclosure.obstacles.iter().any(|o| {
+                o.normal == normal && at.contains(&o.at) && middle > o.from && middle < o.to
+            });
             if !walled && !mesh.solid[other] {
                 faces.push(Face { cells: [cell as u32, other as u32], normal, at, middle });
             }
@@ -107,7 +108,7 @@ impl Balance {
         self.now.copy_from_slice(&self.before);
         for cell in 0..mesh.cells() {
             let total: f64 = self.before[cell * n..][..n].iter().sum();
-            // A cell without particles is full of background, and takes no part.
+            // A cell without particles takes no part.
             let empty = particles.of_cell(cell).is_empty();
             self.excess[cell] = if empty { f64::NAN } else { total / mesh.cell_area(cell) - 1.0 };
         }

@@ -28,13 +28,6 @@ impl<const D: usize> Flow<D> {
         interpolate(&self.of_cell(mesh, cell), &Shape::values(mesh.to_reference(cell, p)))
     }
 
-    /// Velocity gradient `L_ij = u_i,j` at a point.
-    pub fn gradient_at(&self, mesh: &Mesh, p: [f64; 2]) -> Matrix2<f64> {
-        let cell = mesh.locate(p);
-        let nodal = self.of_cell(mesh, cell).map(|u| [u[0], u[1]]);
-        gradient(&nodal, &Shape::at(mesh.to_reference(cell, p)), mesh.cell_size(cell))
-    }
-
     pub fn pressure_at(&self, mesh: &Mesh, p: [f64; 2]) -> f64 {
         let cell = mesh.locate(p);
         let [xi, eta] = mesh.to_reference(cell, p);

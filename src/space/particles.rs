@@ -119,22 +119,4 @@ impl Particles {
         }
         total
     }
-
-    /// Names and bytes per particle of the columns that exist.
-    pub fn columns(&self) -> Vec<(&'static str, usize)> {
-        let mut list = vec![("position", 16), ("volume", 8), ("material", 1)];
-        if self.director.is_some() {
-            list.push(("director", 16));
-        }
-        if self.viscosity.is_some() {
-            list.push(("viscosity", 8));
-        }
-        if self.density.is_some() {
-            list.push(("density", 8));
-        }
-        if self.mark.is_some() {
-            list.push(("mark", 1));
-        }
-        list
-    }
 }

@@ -4,9 +4,11 @@
 //! to the gap: the child takes half of its volume. An overfull cell merges its closest pairs of
 //! one material. Volume is kept material by material; directors are averaged as axes.
 
+use super::balance::open_faces;
 use super::mesh::Mesh;
 use super::particles::Particles;
 use super::seeding::Seeding;
+use super::walls::Enclosure;
 use crate::laws::director;
 
 /// What was done, added up over a run.
@@ -23,12 +25,24 @@ pub struct Count {
 }
 
 /// Bounds on the number of particles per cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Population {
-    pub seeding: Seeding,
+    seeding: Seeding,
+    /// Cells across faces without walls.
+    neighbours: Vec<Vec<u32>>,
 }
 
 impl Population {
+    pub fn new(mesh: &Mesh, enclosure: &Enclosure, seeding: Seeding) -> Self {
+        let mut neighbours = vec![Vec::new(); mesh.cells()];
+        for face in open_faces(mesh, enclosure) {
+            let [a, b] = face.cells;
+            neighbours[a as usize].push(b);
+            neighbours[b as usize].push(a);
+        }
+        Population { seeding, neighbours }
+    }
+
     /// Restores the bounds. `particles` must be sorted, and are sorted on return.
     pub fn control(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
         self.merge(mesh, particles, count);
@@ -63,7 +77,7 @@ impl Population {
             }
         }
         for cell in emptied {
-            count.healed += u64::from(heal(mesh, particles, cell));
+            count.healed += u64::from(self.heal(mesh, particles, cell));
         }
         if particles.len() != before {
             particles.sort(mesh);
@@ -102,6 +116,20 @@ impl Population {
                 .fold(f64::INFINITY, f64::min)
         };
         lattice.max_by(|a, b| clearance(a).total_cmp(&clearance(b)))
+    }
+
+    /// Refills an empty cell with half of the largest particle of its neighbours.
+    fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> bool {
+        let donor = self.neighbours[cell]
+            .iter()
+            .flat_map(|&n| particles.of_cell(n as usize))
+            .max_by(|&a, &b| particles.volume[a].total_cmp(&particles.volume[b]));
+        let Some(donor) = donor else { return false };
+        particles.volume[donor] *= 0.5;
+        particles.duplicate(donor);
+        let child = particles.len() - 1;
+        particles.position[child] = mesh.cell_centre(cell);
+        true
     }
 
     fn merge(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
@@ -176,20 +204,6 @@ fn closest_pair(
         }
     }
     best.map(|(_, pair)| pair)
-}
-
-/// Refills an empty cell with half of the largest particle of its neighbours.
-fn heal(mesh: &Mesh, particles: &mut Particles, cell: usize) -> bool {
-    let donor = mesh
-        .neighbours(cell)
-        .flat_map(|n| particles.of_cell(n))
-        .max_by(|&a, &b| particles.volume[a].total_cmp(&particles.volume[b]));
-    let Some(donor) = donor else { return false };
-    particles.volume[donor] *= 0.5;
-    particles.duplicate(donor);
-    let child = particles.len() - 1;
-    particles.position[child] = mesh.cell_centre(cell);
-    true
 }
 
 impl Particles {

@@ -1,4 +1,4 @@
-//! Placing particles: at the start, and where the background takes over an emptied cell.
+//! Placing particles at the start.
 
 use super::mesh::Mesh;
 use crate::scene::Placement;

@@ -99,8 +99,6 @@ fn a_symmetric_silo_stays_symmetric() {
 
 /// A drop with directors and Cosserat rotation falling beside a wall; `turned` by 90 degrees.
 fn drop(turned: bool) -> Box<dyn Run> {
-    let swap =
-        |a: &str, b: &str| if turned { format!("[{b}, {a}]") } else { format!("[{a}, {b}]") };
     // (x, y) -> (-y, x)
     let (domain_x, domain_y) =
         if turned { ("[-1.5, 0]", "[0, 1]") } else { ("[0, 1]", "[0, 1.5]") };
@@ -112,7 +110,6 @@ fn drop(turned: bool) -> Box<dyn Run> {
     } else {
         "from = [0.5, 0.5]\nto = [1, 0.5]"
     };
-    let _ = swap;
     scene(
         &format!(
             "schema = 1\nname = \"drop\"\ngravity = {gravity}\n[domain]\nx = {domain_x}\ny = {domain_y}\n\
