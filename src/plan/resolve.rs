@@ -65,8 +65,9 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
         {
             return Err(SceneError::new(
                 format!(
-                    "schedule[{index}] changes more than constant material values and gravity: \
-                     mesh, boundaries, loads, the set of solved effects, or what particles carry"
+                    "schedule[{index}] changes the mesh or the set of solved effects, boundaries, \
+                     loads, or what particles carry; only constant material values and gravity \
+                     may change"
                 ),
                 "such a change needs a run of its own",
             ));
