@@ -248,6 +248,10 @@ fn a_schedule_cannot_change_what_is_solved() {
     here.write("shear.toml", SHEAR.replace("y = [0, 1]", "y = [0, \"eta\"]"));
     let moved = here.grainscope(&["check", "shear.toml"]).exits(3);
     moved.complains(&["schedule[0]", "changes the mesh", "a run of its own"]);
+    // A load that follows the parameter is not silently left as it was.
+    here.write("shear.toml", SHEAR.replace("traction_x = 1", "traction_x = \"eta/2\""));
+    let loaded = here.grainscope(&["check", "shear.toml"]).exits(3);
+    loaded.complains(&["schedule[0]", "loads", "a run of its own"]);
 }
 
 #[test]
