@@ -14,7 +14,7 @@ const ROOMS: [(&str, &[&str]); 12] = [
     ("solve", &["laws", "scene", "space", "plan"]),
     ("motion", &["laws", "space", "plan"]),
     ("sim", &["laws", "frame", "scene", "space", "plan", "solve", "motion"]),
-    ("cases", &["scene", "space", "plan", "sim"]),
+    ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
     ("record", &["frame", "scene", "space", "plan", "sim"]),
     ("commands", &["frame", "scene", "plan", "sim", "record"]),
 ];

@@ -1,6 +1,7 @@
 //! Exact solutions of the Cosserat equations.
 
 use super::{Case, Exact, Rates};
+use crate::scene::SceneSource;
 use std::f64::consts::PI;
 
 /// Viscosities and internal length of a Cosserat fluid.
@@ -43,13 +44,18 @@ pub fn couette(fluid: Fluid, tau: f64) -> Case {
     let (h, k) = (0.5, fluid.k());
     let (eta, eta_c) = (fluid.shear, fluid.coupling);
     Case {
-        name: "couette",
-        toml: format!(
-            "{LAYER}{}[boundaries]\nleft.kind = \"periodic\"\nright.kind = \"periodic\"\n\
+        name: "couette".into(),
+        title: "plane Couette flow of a Cosserat fluid",
+        source: "closed form, theory of Dufour, Muehlhaus and Moresi",
+        scene: SceneSource::new(
+            "couette",
+            format!(
+                "{LAYER}{}[boundaries]\nleft.kind = \"periodic\"\nright.kind = \"periodic\"\n\
              bottom = {{ traction_x = {:?}, rotation = 0 }}\n\
              top = {{ traction_x = {tau:?}, rotation = 0 }}\n",
-            fluid.toml(),
-            -tau
+                fluid.toml(),
+                -tau
+            ),
         ),
         exact: Exact {
             velocity: Box::new(move |_, y| {
@@ -73,12 +79,17 @@ pub fn poiseuille(fluid: Fluid, g: f64) -> Case {
     let (h, k) = (0.5, fluid.k());
     let (eta, eta_c) = (fluid.shear, fluid.coupling);
     Case {
-        name: "poiseuille",
-        toml: format!(
-            "{LAYER}{}[body_force]\nx = {g:?}\n[boundaries]\nleft.kind = \"periodic\"\n\
+        name: "poiseuille".into(),
+        title: "plane Poiseuille flow of a Cosserat fluid",
+        source: "closed form, theory of Dufour, Muehlhaus and Moresi",
+        scene: SceneSource::new(
+            "poiseuille",
+            format!(
+                "{LAYER}{}[body_force]\nx = {g:?}\n[boundaries]\nleft.kind = \"periodic\"\n\
              right.kind = \"periodic\"\nbottom = {{ kind = \"no_slip\", rotation = 0 }}\n\
              top = {{ kind = \"no_slip\", rotation = 0 }}\n",
-            fluid.toml()
+                fluid.toml()
+            ),
         ),
         exact: Exact {
             velocity: Box::new(move |_, y| {
@@ -110,18 +121,23 @@ pub fn coupled_cell(fluid: Fluid, m: u32, n: u32) -> Case {
     let drag = k2 * (fluid.shear + fluid.coupling * r2k2 / (2.0 + r2k2));
     let p0 = fluid.shear * k2;
     Case {
-        name: "coupled_cell",
-        toml: format!(
-            "schema = 1\nname = \"case\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[time]\nend = 1\n{}\
+        name: "coupled_cell".into(),
+        title: "stirred cell of a Cosserat fluid",
+        source: "manufactured",
+        scene: SceneSource::new(
+            "coupled_cell",
+            format!(
+                "schema = 1\nname = \"case\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[time]\nend = 1\n{}\
              [body_force]\n\
              x = \"{a:e} * sin({kx:?}*x) * cos({ky:?}*y) - {b:e} * sin({kx:?}*x) * cos({ky:?}*y)\"\n\
              y = \"-{c:e} * cos({kx:?}*x) * sin({ky:?}*y) - {d:e} * cos({kx:?}*x) * sin({ky:?}*y)\"\n\
              [boundaries]\nleft.rotation = 0\nright.rotation = 0\nbottom.rotation = 0\ntop.rotation = 0\n",
-            fluid.toml(),
-            a = drag * ky,
-            b = p0 * kx,
-            c = drag * kx,
-            d = p0 * ky,
+                fluid.toml(),
+                a = drag * ky,
+                b = p0 * kx,
+                c = drag * kx,
+                d = p0 * ky,
+            ),
         ),
         exact: Exact {
             velocity: Box::new(move |x, y| {

@@ -153,6 +153,18 @@ impl Plan {
             &[],
         );
         add(
+            "acceleration",
+            self.acceleration.is_some(),
+            why(
+                self.acceleration.is_some(),
+                "[acceleration]".into(),
+                "no [acceleration], or nothing with a density",
+            ),
+            0,
+            0,
+            &["body force"],
+        );
+        add(
             "carried viscosity",
             e.carried_viscosity,
             why(

@@ -42,6 +42,8 @@ pub struct Plan {
     pub initial: Vec<InitialFields>,
     /// Force and couple per volume fixed in space, SI.
     pub body_force: Option<[FieldFn; 3]>,
+    /// Acceleration fixed in space, SI; acts on the density.
+    pub acceleration: Option<[FieldFn; 2]>,
     pub gauges: Vec<Gauge>,
     pub tracers: Option<Tracers>,
     pub marks: Vec<Mark>,

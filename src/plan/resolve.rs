@@ -284,6 +284,17 @@ fn pair(q: &[Quantity; 2], scope: &Scope) -> Result<[f64; 2]> {
     Ok([q[0].eval(scope)?, q[1].eval(scope)?])
 }
 
+/// A side of the domain.
+fn edge(mut domain: [[f64; 2]; 2], side: usize) -> [[f64; 2]; 2] {
+    domain[side_normal(side)] = [domain[side_normal(side)][side % 2]; 2];
+    domain
+}
+
+/// The domain without its rim, where an acceleration may be infinite: no mass lies on it.
+fn middle(domain: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    domain.map(|[a, b]| [a + (b - a) / 128.0, b - (b - a) / 128.0])
+}
+
 /// Smallest and largest value of a field on a 65 x 65 grid over the domain.
 fn range_of(f: &FieldFn, [x, y]: [[f64; 2]; 2]) -> [f64; 2] {
     if let Some(v) = f.constant() {
@@ -472,12 +483,13 @@ fn choose_units(
     let density = si.materials.iter().map(|m| m.density).fold(0.0, f64::max);
     let gravity = si.gravity[0].hypot(si.gravity[1]);
     let mut rate = density * gravity * length / viscosity;
-    let largest = |f: &Field| -> Result<f64> {
-        let range = finite_range(f, &f.compile(scope)?, domain, "this value")?;
+    let largest = |f: &Field, place: [[f64; 2]; 2]| -> Result<f64> {
+        let range = finite_range(f, &f.compile(scope)?, place, "this value")?;
         Ok(range[0].abs().max(range[1].abs()))
     };
     let b = &scene.boundaries;
-    for side in [&b.left, &b.right, &b.bottom, &b.top] {
+    for (s, side) in [&b.left, &b.right, &b.bottom, &b.top].into_iter().enumerate() {
+        let largest = |f: &Field| largest(f, edge(domain, s));
         for v in [&side.velocity_x, &side.velocity_y].into_iter().flatten() {
             rate = rate.max(largest(v)? / length);
         }
@@ -489,8 +501,13 @@ fn choose_units(
         }
     }
     if let Some(f) = &scene.body_force {
-        rate = rate.max(largest(&f.x)?.max(largest(&f.y)?) * length / viscosity);
-        rate = rate.max(largest(&f.couple)? / viscosity);
+        rate = rate.max(largest(&f.x, domain)?.max(largest(&f.y, domain)?) * length / viscosity);
+        rate = rate.max(largest(&f.couple, domain)? / viscosity);
+    }
+    if let Some(a) = &scene.acceleration {
+        let inside = middle(domain);
+        let size = largest(&a.x, inside)?.max(largest(&a.y, inside)?);
+        rate = rate.max(density * size * length / viscosity);
     }
     let end = scene.time.end.eval(scope)?;
     let time = if rate > 0.0 { 1.0 / rate } else { end };
@@ -548,14 +565,14 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
     }
 
     let regions = regions(scene, scope, domain, &si, &mut warnings)?;
+    let has_density = si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some());
     let effects = EffectSet {
         rotation: si.materials.iter().any(|m| m.rotation.is_some()),
         directors: si.materials.iter().any(|m| m.layer_viscosity.is_some()),
         carried_viscosity: si.materials.iter().any(|m| m.viscosity_field.is_some()),
         carried_density: si.materials.iter().any(|m| m.density_field.is_some()),
         volume_change: si.materials.iter().any(|m| m.compliance > 0.0),
-        gravity: si.gravity != [0.0; 2]
-            && si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some()),
+        gravity: si.gravity != [0.0; 2] && has_density,
     };
     if !effects.rotation {
         for (name, side) in SIDES.iter().zip(&boundary.sides) {
@@ -581,6 +598,19 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
             ])
         })
         .transpose()?;
+    let acceleration = scene
+        .acceleration
+        .as_ref()
+        .map(|a| {
+            let compile = |f: &Field| -> Result<FieldFn> {
+                let compiled = f.compile(scope)?;
+                finite_range(f, &compiled, middle(domain), "acceleration")?;
+                Ok(compiled)
+            };
+            Ok::<_, SceneError>([compile(&a.x)?, compile(&a.y)?])
+        })
+        .transpose()?
+        .filter(|_| has_density);
     check_null_spaces(scene, &boundary, &mesh, &units, &effects, body_force.as_ref())?;
 
     let initial = si
@@ -603,6 +633,7 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
         regions,
         initial,
         body_force,
+        acceleration,
         gauges,
         tracers,
         marks,
@@ -1064,7 +1095,7 @@ fn sides(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<[Side; 4
         }
         let compile = |f: &Field| -> Result<FieldFn> {
             let compiled = f.compile(scope)?;
-            finite_range(f, &compiled, domain, &name)?;
+            finite_range(f, &compiled, edge(domain, s), &name)?;
             Ok(compiled)
         };
         for c in 0..2 {

@@ -4,7 +4,7 @@ use super::error::{SceneError, suggestion};
 use super::load::{SceneSource, parse};
 
 /// Names and texts.
-const PRESETS: [(&str, &str); 7] = [
+const PRESETS: [(&str, &str); 10] = [
     ("silo", include_str!("../../presets/silo.toml")),
     ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
     ("couette_cosserat", include_str!("../../presets/couette_cosserat.toml")),
@@ -12,6 +12,9 @@ const PRESETS: [(&str, &str); 7] = [
     ("rayleigh_taylor", include_str!("../../presets/rayleigh_taylor.toml")),
     ("silo_pencils", include_str!("../../presets/silo_pencils.toml")),
     ("hydrostatic", include_str!("../../presets/hydrostatic.toml")),
+    ("solcx", include_str!("../../presets/solcx.toml")),
+    ("solvi", include_str!("../../presets/solvi.toml")),
+    ("layer_stack", include_str!("../../presets/layer_stack.toml")),
 ];
 
 /// Names and one-line descriptions, in the order to show them.

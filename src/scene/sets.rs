@@ -6,7 +6,7 @@ use super::error::{SceneError, suggestion};
 use super::load::{SceneSource, table};
 
 /// The keys of a scene, as the first part of a path.
-const KEYS: [&str; 19] = [
+const KEYS: [&str; 20] = [
     "schema",
     "name",
     "description",
@@ -22,6 +22,7 @@ const KEYS: [&str; 19] = [
     "walls",
     "blocks",
     "body_force",
+    "acceleration",
     "gauges",
     "dye",
     "recording",

@@ -45,6 +45,9 @@ pub struct Scene {
     /// A force and couple per volume fixed in space, beside gravity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_force: Option<BodyForce>,
+    /// An acceleration fixed in space, beside gravity: it acts on whatever density is there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acceleration: Option<Acceleration>,
     #[serde(default)]
     pub gauges: Vec<Gauge>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -310,6 +313,16 @@ pub struct BodyForce {
     /// N m/m3, acts on the Cosserat rotation.
     #[serde(default = "zero_field")]
     pub couple: Field,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Acceleration {
+    /// m/s2, in x and y.
+    #[serde(default = "zero_field")]
+    pub x: Field,
+    #[serde(default = "zero_field")]
+    pub y: Field,
 }
 
 /// A segment along a mesh line that counts a material crossing it along `direction`.

@@ -135,7 +135,7 @@ impl<const D: usize> Simulation<D> {
         let weight: f64 = if self.plan.effects.gravity {
             self.load
                 .iter()
-                .zip(&self.fixed_load)
+                .zip(&self.other_load)
                 .zip(&self.flow.velocity)
                 .map(|((l, f), u)| (l[0] - f[0]) * u[0] + (l[1] - f[1]) * u[1])
                 .sum()

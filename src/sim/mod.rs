@@ -23,7 +23,7 @@ use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
 use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
-use crate::scene::Integrator;
+use crate::scene::{FieldFn, Integrator};
 use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};
@@ -98,6 +98,8 @@ pub struct Simulation<const D: usize> {
     /// Nodal forces that do not change: tractions and fixed body forces.
     fixed_load: Vec<[f64; D]>,
     load: Vec<[f64; D]>,
+    /// The load without gravity's.
+    other_load: Vec<[f64; D]>,
     matter: Matter,
     /// Counts changes of matter, so that constant element matrices know when to change.
     version: u32,
@@ -172,6 +174,7 @@ impl<const D: usize> Simulation<D> {
             flow: Flow::zero(&mesh),
             previous: None,
             load: fixed_load.clone(),
+            other_load: fixed_load.clone(),
             fixed_load,
             matter: plan.state.clone(),
             version: 0,
@@ -379,11 +382,16 @@ impl<const D: usize> Simulation<D> {
     }
 
     fn update_load(&mut self) {
-        if !self.plan.effects.gravity {
+        let plan = self.plan.clone();
+        if !plan.effects.gravity && plan.acceleration.is_none() {
             return;
         }
         self.load.copy_from_slice(&self.fixed_load);
-        let mesh = &self.plan.mesh;
+        let mesh = &plan.mesh;
+        if let Some(acceleration) = &plan.acceleration {
+            self.add_acceleration(acceleration);
+        }
+        self.other_load.copy_from_slice(&self.load);
         let g = self.matter.gravity;
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
             let area = mesh.cell_area(cell);
@@ -397,6 +405,32 @@ impl<const D: usize> Simulation<D> {
             for (a, node) in mesh.cell_nodes(cell).into_iter().enumerate() {
                 self.load[node][0] += mass[a] * g[0];
                 self.load[node][1] += mass[a] * g[1];
+            }
+        }
+    }
+}
+
+impl<const D: usize> Simulation<D> {
+    /// Adds `integral density a N`.
+    fn add_acceleration(&mut self, acceleration: &[FieldFn; 2]) {
+        let plan = self.plan.clone();
+        let (mesh, units) = (&plan.mesh, &plan.units);
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let area = mesh.cell_area(cell);
+            let mut force = [[0.0; 2]; 9];
+            self.quadrature.for_points(cell, |p, shape| {
+                let [x, y] = plan.si(mesh.from_reference(cell, p.r));
+                for c in 0..2 {
+                    let f = area * p.weight * p.density * acceleration[c].at(x, y)
+                        / units.acceleration();
+                    for (force, n) in force.iter_mut().zip(&shape.n) {
+                        force[c] += f * n;
+                    }
+                }
+            });
+            for (a, node) in mesh.cell_nodes(cell).into_iter().enumerate() {
+                self.load[node][0] += force[a][0];
+                self.load[node][1] += force[a][1];
             }
         }
     }

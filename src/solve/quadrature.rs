@@ -105,6 +105,29 @@ impl Quadrature {
         }
     }
 
+    /// Gauss points with the law, density and viscosity that `at(cell, position)` gives: the
+    /// integration that particles aim at, without any.
+    pub fn from_fields(
+        mesh: &Mesh,
+        materials: usize,
+        mut at: impl FnMut(usize, [f64; 2]) -> (PointLaw, f64, f64),
+    ) -> Self {
+        let mut out = Quadrature::new(mesh, Rule::Mixture, materials);
+        for cell in 0..mesh.cells() {
+            if mesh.solid[cell] {
+                out.content[cell] = Content::Solid;
+                continue;
+            }
+            out.content[cell] = Content::Mixed;
+            for p in &mut out.points[9 * cell..9 * cell + 9] {
+                let viscosity;
+                (p.law, p.density, viscosity) = at(cell, mesh.from_reference(cell, p.r));
+                out.mean_viscosity[cell] += p.weight * viscosity;
+            }
+        }
+        out
+    }
+
     pub fn content(&self, cell: usize) -> Content {
         self.content[cell]
     }

@@ -61,7 +61,7 @@ fn poiseuille_discharges_what_theory_says() {
 
 #[test]
 fn free_rotation_at_the_walls_gives_the_classical_solution() {
-    let text = couette(FLUID, 1.0).toml.replace(", rotation = 0", "");
+    let text = couette(FLUID, 1.0).scene.text().replace(", rotation = 0", "");
     let run = crate::scene(&text, &["accuracy.cells=5", "accuracy.placement=random"]);
     for y in [-0.43, -0.1, 0.22, 0.5] {
         let [u, v, w] = run.velocity_at([0.13, y]);

@@ -1,6 +1,7 @@
 //! What the physics demands: exact solutions, rates, invariants, symmetry.
 
 mod alignment;
+mod cases;
 mod dynamics;
 mod exact;
 mod laws;

@@ -1,0 +1,142 @@
+//! The harness: solves a case and measures its errors.
+
+use super::{Case, Exact};
+use crate::plan::{Plan, resolve};
+use crate::scene::{SceneError, parse};
+use crate::sim::{self, Run, SimError};
+use crate::space::flow::Flow;
+use crate::space::shape::GAUSS_5;
+use serde::Serialize;
+use std::sync::Arc;
+
+/// Relative errors in the L2 norm (absolute where the exact field vanishes).
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Errors {
+    pub velocity: f64,
+    pub rotation: f64,
+    pub pressure: f64,
+}
+
+/// Why a case could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum CaseError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Sim(#[from] SimError),
+}
+
+impl Case {
+    /// The plan at a resolution, with further sets.
+    pub fn plan(&self, cells: u32, sets: &[&str]) -> Result<Plan, CaseError> {
+        let mut all = vec![format!("accuracy.cells={cells}")];
+        all.extend(sets.iter().map(|s| s.to_string()));
+        let source = self.scene.with_sets(&all)?;
+        Ok(resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?)
+    }
+
+    /// Solves the first instant at a resolution.
+    pub fn solve(&self, cells: u32, sets: &[&str]) -> Result<Box<dyn Run>, CaseError> {
+        Ok(sim::start(Arc::new(self.plan(cells, sets)?))?)
+    }
+
+    /// Errors of the first instant.
+    pub fn errors(&self, cells: u32, sets: &[&str]) -> Result<Errors, CaseError> {
+        Ok(Errors::of(self.solve(cells, sets)?.as_ref(), &self.exact))
+    }
+
+    /// Errors at the end of the run.
+    pub fn errors_at_end(&self, cells: u32, sets: &[&str]) -> Result<Errors, CaseError> {
+        let mut run = self.solve(cells, sets)?;
+        while !run.is_finished() {
+            run.step()?;
+        }
+        Ok(Errors::of(run.as_ref(), &self.exact))
+    }
+}
+
+/// Fields of an instant at SI points.
+pub trait Fields {
+    fn plan(&self) -> &Plan;
+    /// Velocity and rotation.
+    fn velocity_at(&self, p: [f64; 2]) -> [f64; 3];
+    fn pressure_at(&self, p: [f64; 2]) -> f64;
+}
+
+impl Fields for dyn Run {
+    fn plan(&self) -> &Plan {
+        Run::plan(self)
+    }
+    fn velocity_at(&self, p: [f64; 2]) -> [f64; 3] {
+        Run::velocity_at(self, p)
+    }
+    fn pressure_at(&self, p: [f64; 2]) -> f64 {
+        Run::pressure_at(self, p)
+    }
+}
+
+/// A flow that was solved for a plan without a run.
+pub(super) struct Solved<'a, const D: usize> {
+    pub plan: &'a Plan,
+    pub flow: Flow<D>,
+}
+
+impl<const D: usize> Fields for Solved<'_, D> {
+    fn plan(&self) -> &Plan {
+        self.plan
+    }
+    fn velocity_at(&self, p: [f64; 2]) -> [f64; 3] {
+        let u = &self.plan.units;
+        let v = self.flow.at(&self.plan.mesh, p.map(|c| c / u.length));
+        let w = if D == 3 { v[D - 1] * u.rate() } else { 0.0 };
+        [v[0] * u.velocity(), v[1] * u.velocity(), w]
+    }
+    fn pressure_at(&self, p: [f64; 2]) -> f64 {
+        let u = &self.plan.units;
+        self.flow.pressure_at(&self.plan.mesh, p.map(|c| c / u.length)) * u.stress()
+    }
+}
+
+impl Errors {
+    /// Errors of the current instant, by 5 x 5 Gauss points in each cell. Where the pressure is
+    /// determined up to a constant its mean does not count.
+    pub fn of<F: Fields + ?Sized>(run: &F, exact: &Exact) -> Errors {
+        let plan = run.plan();
+        let mesh = &plan.mesh;
+        // Sums of squares: error and exact, of velocity, rotation, pressure.
+        let mut sums = [[0.0; 2]; 3];
+        // Sums of weight, pressure error, exact pressure.
+        let mut means = [0.0; 3];
+        let mut add = |k: usize, weight: f64, error: f64, exact: f64| {
+            sums[k][0] += weight * error * error;
+            sums[k][1] += weight * exact * exact;
+        };
+        for cell in 0..mesh.cells() {
+            for (eta, wy) in GAUSS_5 {
+                for (xi, wx) in GAUSS_5 {
+                    let p = plan.si(mesh.from_reference(cell, [xi, eta]));
+                    let weight = wx * wy * mesh.cell_area(cell);
+                    let (u, e) = (run.velocity_at(p), (exact.velocity)(p[0], p[1]));
+                    add(0, weight, u[0] - e[0], e[0]);
+                    add(0, weight, u[1] - e[1], e[1]);
+                    add(1, weight, u[2] - e[2], e[2]);
+                    let (q, e) = (run.pressure_at(p), (exact.pressure)(p[0], p[1]));
+                    add(2, weight, q - e, e);
+                    means[0] += weight;
+                    means[1] += weight * (q - e);
+                    means[2] += weight * e;
+                }
+            }
+        }
+        if plan.boundary.closed {
+            for k in 0..2 {
+                sums[2][k] = (sums[2][k] - means[k + 1] * means[k + 1] / means[0]).max(0.0);
+            }
+        }
+        let relative = |[error, exact]: [f64; 2]| {
+            if exact > 0.0 { (error / exact).sqrt() } else { error.sqrt() }
+        };
+        let [velocity, rotation, pressure] = sums.map(relative);
+        Errors { velocity, rotation, pressure }
+    }
+}
