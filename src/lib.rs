@@ -8,7 +8,8 @@
 //!   in SI units.
 //! - [`space`], [`solve`], [`motion`] are what a step is made of; [`laws`] are the equations of the
 //!   source, as functions of small matrices.
-//! - [`record`] writes recordings, tables and plots; [`cases`] are scenes with exact solutions.
+//! - [`record`] writes recordings, tables and plots; [`cases`] are scenes with exact solutions,
+//!   and [`verify`] measures them.
 //!
 //! ```
 //! use grainscope::{plan, scene, sim};
@@ -44,3 +45,4 @@ pub mod solve;
 pub mod space;
 #[doc(hidden)]
 pub mod testing;
+pub mod verify;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the house, ground floor first, and what each may import.
-const ROOMS: [(&str, &[&str]); 12] = [
+const ROOMS: [(&str, &[&str]); 13] = [
     ("testing", &[]),
     ("laws", &[]),
     ("frame", &[]),
@@ -15,8 +15,9 @@ const ROOMS: [(&str, &[&str]); 12] = [
     ("motion", &["laws", "space", "plan"]),
     ("sim", &["laws", "frame", "scene", "space", "plan", "solve", "motion"]),
     ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
+    ("verify", &["scene", "plan", "sim", "cases"]),
     ("record", &["frame", "scene", "space", "plan", "sim"]),
-    ("commands", &["frame", "scene", "plan", "sim", "record"]),
+    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "record"]),
 ];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {

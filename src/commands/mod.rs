@@ -4,7 +4,9 @@ mod check;
 mod plan;
 mod presets;
 mod run;
+mod verify;
 
+use crate::cases::CaseError;
 use crate::record::folder::FolderError;
 use crate::record::plots::PlotError;
 use crate::record::rerun_log::RecordError;
@@ -20,6 +22,7 @@ mod code {
     pub const SCENE: u8 = 3;
     pub const NOT_CONVERGED: u8 = 4;
     pub const NON_FINITE: u8 = 5;
+    pub const DIFFERS: u8 = 6;
     pub const INTERRUPTED: u8 = 130;
     /// Files, ports, viewers.
     pub const ENVIRONMENT: u8 = 1;
@@ -33,7 +36,7 @@ Exit codes:
   3    the scene is invalid
   4    not converged
   5    not finite
-  6    a comparison differs
+  6    a comparison differs, a check fails
   130  interrupted";
 
 const EXAMPLES: &str = "\
@@ -65,6 +68,8 @@ enum Command {
     Check(check::Args),
     /// List the presets, or show one
     Presets(presets::Args),
+    /// Measure every case with a known answer, and print what was found
+    Verify(verify::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -81,8 +86,18 @@ pub enum Failure {
     Environment(String),
     Usage(String),
     Interrupted,
+    /// Checks that did not pass.
+    Differs(String),
 }
 
+impl From<CaseError> for Failure {
+    fn from(e: CaseError) -> Self {
+        match e {
+            CaseError::Scene(e) => e.into(),
+            CaseError::Sim(e) => e.into(),
+        }
+    }
+}
 impl From<SceneError> for Failure {
     fn from(e: SceneError) -> Self {
         Failure::Scene(Box::new(e))
@@ -119,6 +134,7 @@ impl Failure {
             Failure::Environment(_) => code::ENVIRONMENT,
             Failure::Usage(_) => code::USAGE,
             Failure::Interrupted => code::INTERRUPTED,
+            Failure::Differs(_) => code::DIFFERS,
         }
     }
 
@@ -134,7 +150,9 @@ impl Failure {
             }
             Failure::Scene(e) => eprintln!("{:?}", miette::Report::new(*e)),
             Failure::Sim(e) => eprintln!("error: {e}\n  help: {}", e.remedy()),
-            Failure::Environment(text) | Failure::Usage(text) => eprintln!("error: {text}"),
+            Failure::Environment(text) | Failure::Usage(text) | Failure::Differs(text) => {
+                eprintln!("error: {text}")
+            }
             Failure::Interrupted => {}
         }
     }
@@ -147,6 +165,7 @@ pub fn main() -> ExitCode {
         Command::Plan(args) => plan::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Presets(args) => presets::run(&args),
+        Command::Verify(args) => verify::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

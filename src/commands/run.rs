@@ -491,6 +491,6 @@ fn describe(f: &Failure) -> Option<String> {
         Failure::Sim(e) => Some(format!("{e}; {}", SimError::remedy(e))),
         Failure::Environment(text) | Failure::Usage(text) => Some(text.clone()),
         Failure::Scene(e) => Some(e.one_line()),
-        Failure::Interrupted => None,
+        Failure::Interrupted | Failure::Differs(_) => None,
     }
 }

@@ -98,20 +98,27 @@ pub fn line_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
     write(stem, std::slice::from_ref(plot), SIZE)
 }
 
+/// Writes `<stem>.svg` only.
+pub fn svg_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
+    let path = with_suffix(stem, ".svg");
+    to_svg(&path, std::slice::from_ref(plot), SIZE).map_err(|cause| PlotError { path, cause })
+}
+
 /// Writes several plots, one below the other, to `<stem>.svg` and `<stem>.png`.
 pub fn panels_plot(stem: &Path, plots: &[PlotSpec]) -> Result<(), PlotError> {
     let count = u32::try_from(plots.len()).unwrap_or(1).max(1);
     write(stem, plots, (SIZE.0, PANEL_HEIGHT * count))
 }
 
+/// Not `with_extension`: a stem such as `dt_0.01` has none to replace.
+fn with_suffix(stem: &Path, suffix: &str) -> PathBuf {
+    let mut name = stem.as_os_str().to_owned();
+    name.push(suffix);
+    PathBuf::from(name)
+}
+
 fn write(stem: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), PlotError> {
-    // Not `with_extension`: a stem such as `dt_0.01` has none to replace.
-    let file = |extension: &str| {
-        let mut name = stem.as_os_str().to_owned();
-        name.push(extension);
-        PathBuf::from(name)
-    };
-    let (svg, png) = (file(".svg"), file(".png"));
+    let (svg, png) = (with_suffix(stem, ".svg"), with_suffix(stem, ".png"));
     to_svg(&svg, plots, size).map_err(|cause| PlotError { path: svg, cause })?;
     to_png(&png, plots, size).map_err(|cause| PlotError { path: png, cause })
 }

@@ -500,10 +500,10 @@ impl Scratch {
                 mixture.add(phi, &material.law(eta, &self.texture[9 * m + g]));
                 point.density += phi * density;
                 fractions[m] += point.weight * phi;
-                mean_viscosity += point.weight * phi * eta;
                 compliance += point.weight * phi * material.compliance;
             }
             point.law = mixture.law();
+            mean_viscosity += point.weight * point.law.shear.mean();
         }
         (mean_viscosity, compliance)
     }

@@ -4,7 +4,9 @@ use grainscope::cases::*;
 fn show(case: &Case, cells: &[u32], sets: &[&str]) {
     for &n in cells {
         match case.errors(n, sets) {
-            Ok(e) => println!("{} {sets:?} {n}: u {:.3e} p {:.3e}", case.name, e.velocity, e.pressure),
+            Ok(e) => {
+                println!("{} {sets:?} {n}: u {:.3e} p {:.3e}", case.name, e.velocity, e.pressure)
+            }
             Err(e) => println!("{} {n}: {e}", case.name),
         }
     }
@@ -22,14 +24,22 @@ fn scratch() {
             println!("without {n}: u {:.3e} p {:.3e}", e.velocity, e.pressure);
         }
     }
-    show(&solcx(SolCx { contrast: 1e6, jump: 0.5 }, Drive::BodyForce).unwrap(), &[17, 33, 65], &["accuracy.placement=jittered"]);
+    show(
+        &solcx(SolCx { contrast: 1e6, jump: 0.5 }, Drive::BodyForce).unwrap(),
+        &[17, 33, 65],
+        &["accuracy.placement=jittered"],
+    );
     for rule in ["accuracy.quadrature=mixture", "accuracy.quadrature=particles"] {
         for c in [1e3, 1e6, 1e-3] {
             println!("contrast {c}");
             show(&solvi(c).unwrap(), &[16, 32, 64], &[rule]);
         }
         show(&inclined_shear(Inclined { degrees: 30.0, contrast: 1e3 }), &[16, 32, 64], &[rule]);
-        show(&inclined_pure_shear(Inclined { degrees: 30.0, contrast: 1e3 }), &[16, 32, 64], &[rule]);
+        show(
+            &inclined_pure_shear(Inclined { degrees: 30.0, contrast: 1e3 }),
+            &[16, 32, 64],
+            &[rule],
+        );
     }
     let w = Wave { x: 1, y: 2 };
     show(&layered_cell(w, 10.0), &[16, 32], &[]);
