@@ -23,10 +23,11 @@ use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
 use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
-use crate::scene::Integrator;
+use crate::scene::{Integrator, Quadrature as Rule};
 use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};
+use crate::solve::weight::Weight;
 use crate::space::balance::Balance;
 use crate::space::flow::Flow;
 use crate::space::particles::Particles;
@@ -91,6 +92,7 @@ pub struct Simulation<const D: usize> {
     plan: Arc<Plan>,
     stokes: Stokes<D>,
     quadrature: Quadrature,
+    weight: Weight,
     particles: Particles,
     flow: Flow<D>,
     /// Velocity of the solution before, and the step between the two.
@@ -169,6 +171,7 @@ impl<const D: usize> Simulation<D> {
         }
         let mut sim = Simulation {
             quadrature: Quadrature::new(&mesh, plan.method.quadrature, plan.state.materials.len()),
+            weight: Weight::new(&mesh, plan.state.materials.len()),
             flow: Flow::zero(&mesh),
             previous: None,
             load: fixed_load.clone(),
@@ -385,15 +388,13 @@ impl<const D: usize> Simulation<D> {
         self.load.copy_from_slice(&self.fixed_load);
         let mesh = &self.plan.mesh;
         let g = self.matter.gravity;
+        self.weight.update(mesh, &self.particles, &self.matter.materials, &self.quadrature);
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            let area = mesh.cell_area(cell);
-            let mut mass = [0.0; 9];
-            self.quadrature.for_points(cell, |p, shape| {
-                let m = area * p.weight * p.density;
-                for (mass, n) in mass.iter_mut().zip(&shape.n) {
-                    *mass += m * n;
-                }
-            });
+            let mass = match self.plan.method.quadrature {
+                Rule::Mixture => self.weight.nodal_mass(cell),
+                Rule::Particles => self.quadrature.nodal_mass(cell),
+            };
+            let mass = mass.map(|m| m * mesh.cell_area(cell));
             for (a, node) in mesh.cell_nodes(cell).into_iter().enumerate() {
                 self.load[node][0] += mass[a] * g[0];
                 self.load[node][1] += mass[a] * g[1];
