@@ -16,6 +16,7 @@ pub mod initial;
 mod measure;
 pub mod picture;
 pub mod row;
+mod sampling;
 
 use crate::motion::advect;
 use crate::motion::carrier::Carrier;
@@ -160,10 +161,8 @@ impl<const D: usize> Simulation<D> {
         let mesh = plan.mesh.clone();
         let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
         let stokes = Stokes::new(mesh.clone(), constraints)?;
-        let mut particles = initial::particles(&plan)?;
         let population = Population::new(&mesh, &plan.enclosure, plan.method.seeding);
-        let mut count = Count::default();
-        population.control(&mesh, &mut particles, &mut count);
+        let particles = initial::particles(&plan)?;
         let mut fixed_load = vec![[0.0; D]; mesh.nodes()];
         plan.boundary.add_tractions(&mesh, &plan.units, &mut fixed_load);
         if let Some(f) = &plan.body_force {
