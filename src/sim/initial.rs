@@ -1,9 +1,27 @@
-//! The particles at the start: material, directors and carried fields from the plan's regions.
+//! The particles at the start: material, volume, directors and carried fields from the plan's
+//! regions.
+//!
+//! In a cell that regions divide, the particles of each material stand for exactly its part: their
+//! volumes add up to its area, and they are shifted (by less than their spacing) so that their
+//! centroid is its centroid. A part that no particle happens to lie in gets one of its own. Carried
+//! densities are changed a little so that the cell's fit to them ([`crate::solve::fit`]) is the
+//! fit to the field itself: at the start a level or a stratification has no noise of the
+//! particles' places.
 
+use super::sampling::{Filling, Sample, filling, samples};
 use crate::plan::{InitialDirector, Mark, Plan};
+use crate::scene::FieldFn;
+use crate::solve::fit::{Degree, Fit};
 use crate::space::particles::Particles;
+use crate::space::population::{Count, Population};
+use crate::space::shape::GAUSS_5;
 use rand::Rng;
 use rand_pcg::Pcg64;
+
+/// Parts of a cell below this share are left to its other materials.
+const LEAST_SHARE: f64 = 1e-8;
+/// Shifted particles stay this far inside their cell, in half cells.
+const INSET: f64 = 1e-3;
 
 /// A point of the domain that no region and no background fills.
 #[derive(Debug, thiserror::Error)]
@@ -16,9 +34,8 @@ pub struct Unfilled {
     pub y: f64,
 }
 
-/// Fills every cell.
+/// Fills every cell; sorted.
 pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
-    let mesh = &plan.mesh;
     let effects = &plan.effects;
     let mut out = Particles {
         director: effects.directors.then(Vec::new),
@@ -27,28 +44,34 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
         mark: (!plan.marks.is_empty()).then(Vec::new),
         ..Particles::default()
     };
-    let background = plan.background();
+    let mesh = &plan.mesh;
+    let places = places(plan);
     let start: f64 = plan.method.seeding.random(usize::MAX).random();
+    let mut members = Vec::new();
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let places = &places.position[places.of_cell(cell)];
         let mut random = plan.method.seeding.random(cell);
-        let places = plan.method.seeding.positions(mesh, cell, &mut random);
-        let volume = mesh.cell_area(cell) / places.len() as f64;
+        // The random numbers of the places come first.
+        plan.method.seeding.positions(mesh, cell, &mut random);
+        members.clear();
+        for &position in places {
+            let si = plan.si(position);
+            let filling = filling(plan, si);
+            let material = material(plan, filling).ok_or(Unfilled { x: si[0], y: si[1] })?;
+            let r = mesh.to_reference(cell, position);
+            members.push(Member { r, share: 1.0 / places.len() as f64, material, filling });
+        }
+        let samples = samples(plan, cell);
+        divide(plan, cell, &samples, &mut members);
         let (i, j) = mesh.cell_ij(cell);
-        let angles = spread_angles(places.len(), [i, j], start, &mut random);
-        for (p, angle) in places.into_iter().zip(angles) {
-            let si = plan.si(p);
-            let region = plan.regions.iter().rev().find(|r| r.shape.contains(si));
-            let material =
-                region.map(|r| r.material).or(background).ok_or(Unfilled { x: si[0], y: si[1] })?;
-            out.push(p, volume, material);
+        let angles = spread_angles(members.len(), [i, j], start, &mut random);
+        let first = out.len();
+        for (member, angle) in members.iter().zip(angles) {
+            let position = mesh.from_reference(cell, member.r);
+            out.push(position, member.share * mesh.cell_area(cell), member.material);
             let last = out.len() - 1;
-            let fields = &plan.initial[material as usize];
-            if let (Some(column), Some(f)) = (&mut out.viscosity, &fields.viscosity) {
-                column[last] = f.at(si[0], si[1]) / plan.units.viscosity;
-            }
-            if let (Some(column), Some(f)) = (&mut out.density, &fields.density) {
-                column[last] = f.at(si[0], si[1]) / plan.units.density;
-            }
+            let si = plan.si(position);
+            let region = member.filling.map(|f| &plan.regions[f]);
             if let (Some(column), Some(d)) =
                 (&mut out.director, region.and_then(|r| r.director.as_ref()))
             {
@@ -59,14 +82,149 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
                 column[last] = [angle.cos(), angle.sin()];
             }
             if let Some(column) = &mut out.mark {
-                column[last] = plan.marks.iter().any(|m| is_near(m, p));
+                column[last] = plan.marks.iter().any(|m| is_near(m, position));
             }
         }
+        carry(plan, cell, &samples, &members, (&mut out, first));
     }
     out.sort(mesh);
     Ok(out)
 }
 
+/// Where particles start, all cells within the bounds of the population; sorted.
+fn places(plan: &Plan) -> Particles {
+    let mesh = &plan.mesh;
+    let mut out = Particles::default();
+    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let mut random = plan.method.seeding.random(cell);
+        let positions = plan.method.seeding.positions(mesh, cell, &mut random);
+        let volume = mesh.cell_area(cell) / positions.len() as f64;
+        positions.into_iter().for_each(|p| out.push(p, volume, 0));
+    }
+    out.sort(mesh);
+    Population::new(mesh, &plan.enclosure, plan.method.seeding).control(
+        mesh,
+        &mut out,
+        &mut Count::default(),
+    );
+    out
+}
+
+/// A particle in the making.
+#[derive(Clone, Copy)]
+struct Member {
+    /// Reference coordinates.
+    r: [f64; 2],
+    /// Of the cell's area.
+    share: f64,
+    material: u8,
+    filling: Filling,
+}
+
+fn material(plan: &Plan, filling: Filling) -> Option<u8> {
+    filling.map(|f| plan.regions[f].material).or(plan.background())
+}
+
+/// Lets the particles of each material stand for its part of a cell.
+fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member>) {
+    let materials = plan.state.materials.len();
+    // Share and first moments of each material.
+    let mut parts = vec![[0.0; 3]; materials];
+    for s in samples {
+        if let Some(m) = material(plan, s.filling) {
+            let part = &mut parts[m as usize];
+            part[0] += s.share;
+            part[1] += s.share * s.r[0];
+            part[2] += s.share * s.r[1];
+        }
+    }
+    let total: f64 = parts.iter().map(|p| p[0]).filter(|&s| s > LEAST_SHARE).sum();
+    // One region, or particles where the lines saw nothing: equal shares.
+    let unseen = |m: &Member| parts[m.material as usize][0] <= LEAST_SHARE;
+    if total == 0.0 || members.iter().any(unseen) {
+        return;
+    }
+    for (m, part) in parts.iter().enumerate().filter(|(_, p)| p[0] > LEAST_SHARE) {
+        let centroid = [part[1] / part[0], part[2] / part[0]];
+        let of_m = |p: &&mut Member| p.material as usize == m;
+        let mut own: Vec<&mut Member> = members.iter_mut().filter(of_m).collect();
+        let share = part[0] / total;
+        if own.is_empty() {
+            members.extend(lone(plan, cell, samples, (m as u8, centroid, share)));
+            continue;
+        }
+        let count = own.len() as f64;
+        own.iter_mut().for_each(|p| p.share = share / count);
+        for c in 0..2 {
+            let mean = own.iter().map(|p| p.r[c]).sum::<f64>() / count;
+            // Drawn together where the shift alone would take some out of the cell.
+            let edge = centroid[c].abs().max(1.0 - INSET);
+            let room = |p: &&mut Member| {
+                let from_mean = p.r[c] - mean;
+                (from_mean.signum() * edge - centroid[c]) / from_mean
+            };
+            let scale = own.iter().map(room).filter(|s| s.is_finite()).fold(1.0, f64::min);
+            own.iter_mut().for_each(|p| p.r[c] = centroid[c] + scale * (p.r[c] - mean));
+        }
+    }
+}
+
+/// The only particle of a material's part: where the part is nearest to its centroid.
+fn lone(
+    plan: &Plan,
+    cell: usize,
+    samples: &[Sample],
+    (m, centroid, share): (u8, [f64; 2], f64),
+) -> Option<Member> {
+    let distance = |s: &Sample| (s.r[0] - centroid[0]).hypot(s.r[1] - centroid[1]);
+    let nearest = samples
+        .iter()
+        .filter(|s| material(plan, s.filling) == Some(m))
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let there = filling(plan, plan.si(plan.mesh.from_reference(cell, centroid)));
+    let r = if there == nearest.filling { centroid } else { nearest.r };
+    Some(Member { r, share, material: m, filling: nearest.filling })
+}
+
+/// Viscosities and densities that the particles of a cell carry.
+fn carry(
+    plan: &Plan,
+    cell: usize,
+    samples: &[Sample],
+    members: &[Member],
+    (out, first): (&mut Particles, usize),
+) {
+    for (m, fields) in plan.initial.iter().enumerate() {
+        let of_m = || (0..members.len()).filter(|&k| members[k].material as usize == m);
+        let value = |f: &FieldFn, r: [f64; 2], unit: f64| {
+            let si = plan.si(plan.mesh.from_reference(cell, r));
+            f.at(si[0], si[1]) / unit
+        };
+        if let (Some(column), Some(f)) = (&mut out.viscosity, &fields.viscosity) {
+            for k in of_m() {
+                column[first + k] = value(f, members[k].r, plan.units.viscosity);
+            }
+        }
+        let (Some(column), Some(f)) = (&mut out.density, &fields.density) else { continue };
+        let at = |r| value(f, r, plan.units.density);
+        let mut carried = Fit::default();
+        of_m().for_each(|k| carried.add(members[k].share, members[k].r, at(members[k].r)));
+        let Some(carried) = carried.solve(Degree::Quadratic) else { continue };
+        let mut field = Fit::default();
+        if samples.is_empty() {
+            for (y, wy) in GAUSS_5 {
+                GAUSS_5.iter().for_each(|(x, wx)| field.add(wx * wy, [*x, y], at([*x, y])));
+            }
+        }
+        let part = samples.iter().filter(|s| material(plan, s.filling) == Some(m as u8));
+        part.for_each(|s| field.add(s.share, s.r, at(s.r)));
+        let field = field.solve(carried.degree).unwrap_or(carried);
+        for k in of_m() {
+            let r = members[k].r;
+            column[first + k] = at(r) + field.at(r) - carried.at(r);
+        }
+    }
+}
 /// Angles spread evenly over `[-pi/2, pi/2)` in random order: `n` equal steps with an offset from
 /// a two-dimensional low-discrepancy sequence (Roberts 2018) over the cells, so that neighbouring
 /// cells fill each other's gaps. Each angle is uniformly distributed; means over few cells have

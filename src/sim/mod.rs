@@ -16,6 +16,7 @@ pub mod initial;
 mod measure;
 pub mod picture;
 pub mod row;
+mod sampling;
 
 use crate::motion::advect;
 use crate::motion::carrier::Carrier;
@@ -23,10 +24,11 @@ use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
 use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
-use crate::scene::{FieldFn, Integrator};
+use crate::scene::{FieldFn, Integrator, Quadrature as Rule};
 use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};
+use crate::solve::weight::Weight;
 use crate::space::balance::Balance;
 use crate::space::flow::Flow;
 use crate::space::particles::Particles;
@@ -91,6 +93,7 @@ pub struct Simulation<const D: usize> {
     plan: Arc<Plan>,
     stokes: Stokes<D>,
     quadrature: Quadrature,
+    weight: Weight,
     particles: Particles,
     flow: Flow<D>,
     /// Velocity of the solution before, and the step between the two.
@@ -160,10 +163,8 @@ impl<const D: usize> Simulation<D> {
         let mesh = plan.mesh.clone();
         let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
         let stokes = Stokes::new(mesh.clone(), constraints)?;
-        let mut particles = initial::particles(&plan)?;
         let population = Population::new(&mesh, &plan.enclosure, plan.method.seeding);
-        let mut count = Count::default();
-        population.control(&mesh, &mut particles, &mut count);
+        let particles = initial::particles(&plan)?;
         let mut fixed_load = vec![[0.0; D]; mesh.nodes()];
         plan.boundary.add_tractions(&mesh, &plan.units, &mut fixed_load);
         if let Some(f) = &plan.body_force {
@@ -171,6 +172,7 @@ impl<const D: usize> Simulation<D> {
         }
         let mut sim = Simulation {
             quadrature: Quadrature::new(&mesh, plan.method.quadrature, plan.state.materials.len()),
+            weight: Weight::new(&mesh, plan.state.materials.len()),
             flow: Flow::zero(&mesh),
             previous: None,
             load: fixed_load.clone(),
@@ -388,46 +390,35 @@ impl<const D: usize> Simulation<D> {
         }
         self.load.copy_from_slice(&self.fixed_load);
         let mesh = &plan.mesh;
+        self.weight.update(mesh, &self.particles, &self.matter.materials, &self.quadrature);
         if let Some(acceleration) = &plan.acceleration {
-            self.add_acceleration(acceleration);
+            self.add_weight(|[x, y]| acceleration.each_ref().map(|a| a.at(x, y)));
         }
         self.other_load.copy_from_slice(&self.load);
-        let g = self.matter.gravity;
-        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            let area = mesh.cell_area(cell);
-            let mut mass = [0.0; 9];
-            self.quadrature.for_points(cell, |p, shape| {
-                let m = area * p.weight * p.density;
-                for (mass, n) in mass.iter_mut().zip(&shape.n) {
-                    *mass += m * n;
-                }
-            });
-            for (a, node) in mesh.cell_nodes(cell).into_iter().enumerate() {
-                self.load[node][0] += mass[a] * g[0];
-                self.load[node][1] += mass[a] * g[1];
-            }
-        }
+        let g = self.matter.gravity.map(|g| g * plan.units.acceleration());
+        self.add_weight(|_| g);
     }
-}
 
-impl<const D: usize> Simulation<D> {
-    /// Adds `integral density a N`.
-    fn add_acceleration(&mut self, acceleration: &[FieldFn; 2]) {
+    /// Adds `integral density a N` for an acceleration in SI units and coordinates.
+    fn add_weight(&mut self, acceleration: impl Fn([f64; 2]) -> [f64; 2]) {
         let plan = self.plan.clone();
-        let (mesh, units) = (&plan.mesh, &plan.units);
+        let (mesh, unit) = (&plan.mesh, plan.units.acceleration());
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
             let area = mesh.cell_area(cell);
             let mut force = [[0.0; 2]; 9];
-            self.quadrature.for_points(cell, |p, shape| {
-                let [x, y] = plan.si(mesh.from_reference(cell, p.r));
-                for c in 0..2 {
-                    let f = area * p.weight * p.density * acceleration[c].at(x, y)
-                        / units.acceleration();
-                    for (force, n) in force.iter_mut().zip(&shape.n) {
-                        force[c] += f * n;
-                    }
+            let mut add = |mass: f64, r: [f64; 2], n: &[f64; 9]| {
+                let a = acceleration(plan.si(mesh.from_reference(cell, r)));
+                for (force, n) in force.iter_mut().zip(n) {
+                    force[0] += area * mass * n * a[0] / unit;
+                    force[1] += area * mass * n * a[1] / unit;
                 }
-            });
+            };
+            match plan.method.quadrature {
+                Rule::Mixture => self.weight.for_points(cell, &mut add),
+                Rule::Particles => self.quadrature.for_points(cell, |p, shape| {
+                    add(p.weight * p.density, p.r, &shape.n);
+                }),
+            }
             for (a, node) in mesh.cell_nodes(cell).into_iter().enumerate() {
                 self.load[node][0] += force[a][0];
                 self.load[node][1] += force[a][1];

@@ -3,5 +3,7 @@
 
 pub mod cholesky;
 pub mod element;
+pub mod fit;
 pub mod quadrature;
 pub mod stokes;
+pub mod weight;

@@ -9,6 +9,7 @@
 //! **Particles**. Each particle is an integration point with its own law and a weight
 //! proportional to its volume: the method of the source, for comparison.
 
+use super::fit::{Degree, Fit};
 use crate::laws::point::{Mixture, PointLaw};
 use crate::plan::material::{Material, Texture};
 use crate::scene::Quadrature as Rule;
@@ -32,6 +33,7 @@ const LEAST_RESPONSE: f64 = 1e-4;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IntegrationPoint {
     pub law: PointLaw,
+    /// Of particles as integration points; Gauss points have theirs from `weight`.
     pub density: f64,
     /// Share of the cell's area.
     pub weight: f64,
@@ -162,6 +164,11 @@ impl Quadrature {
         self.fractions[cell * self.materials + material]
     }
 
+    /// Factor on each material's volume in cut cells.
+    pub fn factors(&self) -> &[f64] {
+        &self.factors
+    }
+
     /// Area of a material as the solver sees it.
     pub fn projected_area(&self, mesh: &Mesh, material: usize) -> f64 {
         (0..mesh.cells()).map(|c| self.fraction(c, material) * mesh.cell_area(c)).sum()
@@ -267,7 +274,7 @@ impl Quadrature {
             Content::Uniform { material, .. } => {
                 let law = self.fill_uniform(cell, material as usize, materials);
                 for p in &mut self.points[9 * cell..9 * cell + 9] {
-                    (p.law, p.density) = (law, materials[material as usize].density);
+                    p.law = law;
                 }
             }
             Content::Mixed => {
@@ -385,8 +392,7 @@ struct Scratch {
     texture: Vec<Texture>,
     /// Per material.
     volume: Vec<f64>,
-    log_viscosity: Vec<LinearFit>,
-    density: Vec<LinearFit>,
+    log_viscosity: Vec<Fit>,
 }
 
 impl Scratch {
@@ -395,8 +401,7 @@ impl Scratch {
             weight: vec![0.0; 9 * materials],
             texture: vec![Texture::default(); 9 * materials],
             volume: vec![0.0; materials],
-            log_viscosity: vec![LinearFit::default(); materials],
-            density: vec![LinearFit::default(); materials],
+            log_viscosity: vec![Fit::default(); materials],
         }
     }
 
@@ -404,8 +409,7 @@ impl Scratch {
         self.weight.fill(0.0);
         self.texture.fill(Texture::default());
         self.volume.fill(0.0);
-        self.log_viscosity.fill(LinearFit::default());
-        self.density.fill(LinearFit::default());
+        self.log_viscosity.iter_mut().for_each(Fit::clear);
         for p in particles.of_cell(cell) {
             let m = particles.material[p] as usize;
             let volume = particles.volume[p];
@@ -426,9 +430,6 @@ impl Scratch {
             }
             if let (Some(v), true) = (&particles.viscosity, materials[m].carries_viscosity) {
                 self.log_viscosity[m].add(volume, r, v[p].ln());
-            }
-            if let (Some(d), true) = (&particles.density, materials[m].carries_density) {
-                self.density[m].add(volume, r, d[p]);
             }
         }
     }
@@ -476,14 +477,13 @@ impl Scratch {
         materials: &[Material],
         factors: &[f64],
     ) -> (f64, f64) {
-        let viscosity_fit: Vec<_> = self.log_viscosity.iter().map(LinearFit::solve).collect();
-        let density_fit: Vec<_> = self.density.iter().map(LinearFit::solve).collect();
+        let viscosity_fit: Vec<_> =
+            self.log_viscosity.iter().map(|f| f.solve(Degree::Quadratic)).collect();
         self.match_volumes(points, factors);
         fractions.fill(0.0);
         let (mut mean_viscosity, mut compliance) = (0.0, 0.0);
         for (g, point) in points.iter_mut().enumerate() {
             let mut mixture = Mixture::default();
-            point.density = 0.0;
             for (m, material) in materials.iter().enumerate() {
                 let phi = self.weight[9 * m + g];
                 if phi == 0.0 {
@@ -493,12 +493,7 @@ impl Scratch {
                     Some(fit) if material.carries_viscosity => fit.at_clipped(point.r).exp(),
                     _ => material.viscosity,
                 };
-                let density = match &density_fit[m] {
-                    Some(fit) if material.carries_density => fit.at(point.r),
-                    _ => material.density,
-                };
                 mixture.add(phi, &material.law(eta, &self.texture[9 * m + g]));
-                point.density += phi * density;
                 fractions[m] += point.weight * phi;
                 compliance += point.weight * phi * material.compliance;
             }
@@ -506,71 +501,5 @@ impl Scratch {
             mean_viscosity += point.weight * point.law.shear.mean();
         }
         (mean_viscosity, compliance)
-    }
-}
-
-/// Weighted least squares of `a + b xi + c eta` over the particles of a material in a cell.
-#[derive(Clone, Copy, Default)]
-struct LinearFit {
-    count: u32,
-    /// Sums of w, w xi, w eta, w xi^2, w xi eta, w eta^2.
-    moment: [f64; 6],
-    /// Sums of w f, w f xi, w f eta.
-    value: [f64; 3],
-    low: f64,
-    high: f64,
-}
-
-struct Fitted {
-    coefficient: [f64; 3],
-    low: f64,
-    high: f64,
-}
-
-impl LinearFit {
-    fn add(&mut self, w: f64, r: [f64; 2], f: f64) {
-        let [x, y] = r;
-        for (s, v) in self.moment.iter_mut().zip([1.0, x, y, x * x, x * y, y * y]) {
-            *s += w * v;
-        }
-        for (s, v) in self.value.iter_mut().zip([1.0, x, y]) {
-            *s += w * f * v;
-        }
-        if self.count == 0 {
-            (self.low, self.high) = (f, f);
-        }
-        self.low = self.low.min(f);
-        self.high = self.high.max(f);
-        self.count += 1;
-    }
-
-    /// `None` without particles; a constant where they do not determine a slope.
-    fn solve(&self) -> Option<Fitted> {
-        if self.count == 0 {
-            return None;
-        }
-        let [w, x, y, xx, xy, yy] = self.moment;
-        let mean = self.value[0] / w;
-        // Slopes from central moments.
-        let (cx, cy) = (x / w, y / w);
-        let (sxx, sxy, syy) = (xx / w - cx * cx, xy / w - cx * cy, yy / w - cy * cy);
-        let (fx, fy) = (self.value[1] / w - mean * cx, self.value[2] / w - mean * cy);
-        let det = sxx * syy - sxy * sxy;
-        let (b, c) = if self.count >= 3 && det > 1e-3 * (sxx + syy).powi(2) && sxx + syy > 1e-4 {
-            ((fx * syy - fy * sxy) / det, (fy * sxx - fx * sxy) / det)
-        } else {
-            (0.0, 0.0)
-        };
-        let coefficient = [mean - b * cx - c * cy, b, c];
-        Some(Fitted { coefficient, low: self.low, high: self.high })
-    }
-}
-
-impl Fitted {
-    fn at(&self, r: [f64; 2]) -> f64 {
-        self.coefficient[0] + self.coefficient[1] * r[0] + self.coefficient[2] * r[1]
-    }
-    fn at_clipped(&self, r: [f64; 2]) -> f64 {
-        self.at(r).clamp(self.low, self.high)
     }
 }

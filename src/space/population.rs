@@ -1,8 +1,10 @@
 //! Population control: no cell runs empty or overfull.
 //!
 //! A cell that lacks particles, or has none in one of its quadrants, splits the particle nearest
-//! to the gap: the child takes half of its volume. An overfull cell merges its closest pairs of
-//! one material. Volume is kept material by material; directors are averaged as axes.
+//! to the gap: the child takes half of its volume, and all of its kind there move a little so that
+//! their centroid stays. An overfull cell merges its closest pairs of one material. Volume and
+//! centroid are kept material by material (so a level at rest stays there, and no potential energy
+//! is made); directors are averaged as axes.
 
 use super::balance::open_faces;
 use super::mesh::Mesh;
@@ -10,6 +12,9 @@ use super::particles::Particles;
 use super::seeding::Seeding;
 use super::walls::Enclosure;
 use crate::laws::director;
+
+/// Shifted particles stay within this, in half cells.
+const INSIDE: f64 = 0.999;
 
 /// What was done, added up over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,6 +78,7 @@ impl Population {
                 let child = particles.len() - 1;
                 particles.position[child] = mesh.from_reference(cell, gap);
                 members.push(child);
+                keep_centroid(mesh, particles, cell, &members, (parent, child));
                 count.splits += 1;
             }
         }
@@ -177,6 +183,29 @@ fn nearest(
         .or_else(|| members.iter().max_by(by_volume))
         .copied()
         .unwrap_or(members[0])
+}
+
+/// Shifts all members of the kind of a parent and its child, whose volume came from the parent's
+/// place, such that their centroid is what it was; none leaves the cell.
+fn keep_centroid(
+    mesh: &Mesh,
+    particles: &mut Particles,
+    cell: usize,
+    members: &[usize],
+    (parent, child): (usize, usize),
+) {
+    let kind = particles.material[child];
+    let kin = || members.iter().copied().filter(|&p| particles.material[p] == kind);
+    let volume: f64 = kin().map(|p| particles.volume[p]).sum();
+    let share = particles.volume[child] / volume;
+    let shift =
+        [0, 1].map(|c| share * (particles.position[parent][c] - particles.position[child][c]));
+    let kin: Vec<usize> = kin().collect();
+    for p in kin {
+        let [x, y] = particles.position[p];
+        let r = mesh.to_reference(cell, [x + shift[0], y + shift[1]]);
+        particles.position[p] = mesh.from_reference(cell, r.map(|c| c.clamp(-INSIDE, INSIDE)));
+    }
 }
 
 /// The two members of one kind that cost least to merge: close and small.

@@ -6,6 +6,7 @@ mod dynamics;
 mod exact;
 mod laws;
 mod patch;
+mod rest;
 
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse};

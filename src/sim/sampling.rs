@@ -1,0 +1,232 @@
+//! Which region fills which part of a cell, to rounding: what the particles at the start stand for.
+//!
+//! A cell is swept by lines; along each the boundaries between regions are found exactly (where a
+//! rectangle or circle meets the line) or by bisection (where an expression changes), so a level
+//! or an undulation far below the spacing of particles keeps its place. Lines run along `y` or
+//! along `x`, whichever meets more boundaries.
+
+use crate::plan::{Area, Plan};
+use crate::space::shape::GAUSS_3;
+use crate::space::shape::GAUSS_3_WEIGHTS;
+
+/// Parts of a cell below this share are rounding of coordinates.
+const SLIVER: f64 = 1e-9;
+/// Expressions are looked at this often along a line: the smallest drop they can make.
+const PROBES: usize = 12;
+/// Pieces of two lines each across a cell.
+const PIECES: usize = 6;
+/// Pieces across a cell that is cut: more, for boundaries that leave it through its other sides.
+const FINE_PIECES: usize = 24;
+/// Halvings of an interval of [`PROBES`]: to rounding.
+const HALVINGS: usize = 50;
+/// Gauss rule of two points on `[0, 1]`.
+const GAUSS_2: [f64; 2] = [0.211_324_865_405_187_13, 0.788_675_134_594_812_9];
+
+/// Index of a region, or `None` where only the background is.
+pub type Filling = Option<usize>;
+
+/// A part of a cell that one region fills.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// Reference coordinates.
+    pub r: [f64; 2],
+    /// Of the cell's area.
+    pub share: f64,
+    pub filling: Filling,
+}
+
+/// The region that is painted last over an SI point.
+pub fn filling(plan: &Plan, si: [f64; 2]) -> Filling {
+    plan.regions.iter().rposition(|r| r.shape.contains(si))
+}
+
+/// Parts of a cell by region; empty if a single region fills it.
+pub fn samples(plan: &Plan, cell: usize) -> Vec<Sample> {
+    let sampler = Sampler::new(plan, cell);
+    if sampler.shapes.is_empty() {
+        return Vec::new();
+    }
+    let [columns, rows] = [1, 0].map(|along| sampler.sweep(along, PIECES));
+    if columns.is_uniform() && rows.is_uniform() {
+        return Vec::new();
+    }
+    let along = usize::from(columns.crossings >= rows.crossings);
+    sampler.sweep(along, FINE_PIECES).samples
+}
+
+/// A cell with the shapes that may have a boundary in it.
+struct Sampler<'a> {
+    plan: &'a Plan,
+    /// SI coordinates of the sides, by axis.
+    range: [[f64; 2]; 2],
+    shapes: Vec<&'a Area>,
+    /// Some of them are expressions.
+    probing: bool,
+}
+
+/// What a set of parallel lines met.
+#[derive(Default)]
+struct Sweep {
+    samples: Vec<Sample>,
+    crossings: usize,
+}
+
+impl Sweep {
+    fn is_uniform(&self) -> bool {
+        self.crossings == 0 && self.samples.windows(2).all(|w| w[0].filling == w[1].filling)
+    }
+}
+
+impl<'a> Sampler<'a> {
+    fn new(plan: &'a Plan, cell: usize) -> Self {
+        let (i, j) = plan.mesh.cell_ij(cell);
+        let range = [(&plan.mesh.x, i), (&plan.mesh.y, j)]
+            .map(|(axis, k)| [axis.lines()[k], axis.lines()[k + 1]].map(|c| c * plan.units.length));
+        let shapes: Vec<_> =
+            plan.regions.iter().map(|r| &r.shape).filter(|s| may_cut(s, range)).collect();
+        let probing = shapes.iter().any(|s| matches!(s, Area::Where(_)));
+        Sampler { plan, range, shapes, probing }
+    }
+
+    /// Lines along axis `along`, two in each piece of the other axis.
+    fn sweep(&self, along: usize, pieces: usize) -> Sweep {
+        let across = 1 - along;
+        let mut cuts: Vec<f64> = (0..=pieces).map(|k| k as f64 / pieces as f64).collect();
+        for shape in &self.shapes {
+            match shape {
+                Area::Rectangle { x, y } => {
+                    cuts.extend([x, y][across].map(|c| self.fraction(across, c)));
+                }
+                Area::Circle { centre, radius } => {
+                    for c in [centre[across] - radius, centre[across] + radius] {
+                        cuts.push(self.fraction(across, c));
+                    }
+                }
+                Area::Everywhere | Area::Where(_) => {}
+            }
+        }
+        tidy(&mut cuts);
+        let mut out = Sweep::default();
+        for piece in cuts.windows(2) {
+            let width = piece[1] - piece[0];
+            for g in GAUSS_2 {
+                let at = piece[0] + g * width;
+                let parts = self.line(along, at);
+                out.crossings += parts.len() - 1;
+                for ([from, to], filling) in parts {
+                    for (x, w) in GAUSS_3.iter().zip(GAUSS_3_WEIGHTS) {
+                        let t = 0.5 * (from + to) + 0.5 * (to - from) * x;
+                        let mut r = [2.0 * at - 1.0; 2];
+                        r[along] = 2.0 * t - 1.0;
+                        let share = 0.5 * width * (to - from) * w;
+                        out.samples.push(Sample { r, share, filling });
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Intervals of one filling along a line; fractions of the cell, ascending.
+    fn line(&self, along: usize, at: f64) -> Vec<([f64; 2], Filling)> {
+        let across = 1 - along;
+        let c = self.coordinate(across, at);
+        let mut cuts = vec![0.0, 1.0];
+        for shape in &self.shapes {
+            match shape {
+                Area::Rectangle { x, y } => {
+                    cuts.extend([x, y][along].map(|c| self.fraction(along, c)));
+                }
+                Area::Circle { centre, radius } => {
+                    let half2 = radius * radius - (c - centre[across]).powi(2);
+                    if half2 > 0.0 {
+                        for s in [-1.0, 1.0] {
+                            cuts.push(self.fraction(along, centre[along] + s * half2.sqrt()));
+                        }
+                    }
+                }
+                Area::Everywhere | Area::Where(_) => {}
+            }
+        }
+        tidy(&mut cuts);
+        let filling = |t: f64| {
+            let mut p = [c; 2];
+            p[along] = self.coordinate(along, t);
+            filling(self.plan, p)
+        };
+        let mut parts: Vec<([f64; 2], Filling)> = Vec::new();
+        let mut add = |from: f64, to: f64, filling| match parts.last_mut() {
+            Some(last) if last.1 == filling => last.0[1] = to,
+            _ => parts.push(([from, to], filling)),
+        };
+        for piece in cuts.windows(2) {
+            let (start, length) = (piece[0], piece[1] - piece[0]);
+            if !self.probing {
+                add(start, piece[1], filling(start + 0.5 * length));
+                continue;
+            }
+            // Just inside the ends: a boundary close to a mesh line is not to be missed.
+            let probes = (PROBES as f64 * length).ceil().max(1.0) as usize;
+            let probe =
+                |k: usize| start + length * (k as f64 / probes as f64).clamp(SLIVER, 1.0 - SLIVER);
+            let (mut before, mut since) = (filling(probe(0)), start);
+            for k in 1..=probes {
+                let here = filling(probe(k));
+                if here == before {
+                    continue;
+                }
+                let (mut low, mut high) = (probe(k - 1), probe(k));
+                for _ in 0..HALVINGS {
+                    let middle = 0.5 * (low + high);
+                    if filling(middle) == before { low = middle } else { high = middle }
+                }
+                add(since, high, before);
+                (before, since) = (here, high);
+            }
+            add(since, piece[1], before);
+        }
+        parts
+    }
+
+    fn coordinate(&self, axis: usize, fraction: f64) -> f64 {
+        let [from, to] = self.range[axis];
+        from + fraction * (to - from)
+    }
+
+    fn fraction(&self, axis: usize, coordinate: f64) -> f64 {
+        let [from, to] = self.range[axis];
+        (coordinate - from) / (to - from)
+    }
+}
+
+/// Sorts cuts of `[0, 1]` and drops those outside it or too close together.
+fn tidy(cuts: &mut Vec<f64>) {
+    cuts.retain(|&c| c == 0.0 || c == 1.0 || (c > SLIVER && c < 1.0 - SLIVER));
+    cuts.sort_by(f64::total_cmp);
+    cuts.dedup_by(|b, a| *b - *a < SLIVER);
+}
+
+/// Whether a shape may have a boundary inside a cell.
+fn may_cut(shape: &Area, range: [[f64; 2]; 2]) -> bool {
+    match shape {
+        Area::Everywhere => false,
+        Area::Where(_) => true,
+        Area::Rectangle { x, y } => {
+            let sides = [x, y];
+            let meets = |a: usize| sides[a][0] < range[a][1] && sides[a][1] > range[a][0];
+            let covers = |a: usize| sides[a][0] <= range[a][0] && sides[a][1] >= range[a][1];
+            meets(0) && meets(1) && !(covers(0) && covers(1))
+        }
+        Area::Circle { centre, radius } => {
+            let (mut nearest, mut farthest) = (0.0, 0.0);
+            for a in 0..2 {
+                let [from, to] = range[a].map(|c| c - centre[a]);
+                let inside = if from < 0.0 && to > 0.0 { 0.0 } else { from.abs().min(to.abs()) };
+                nearest += inside * inside;
+                farthest += from.abs().max(to.abs()).powi(2);
+            }
+            let r2 = radius * radius;
+            nearest < r2 && r2 < farthest
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The density of each cell as gravity sees it.
+//!
+//! In a cut cell the share of material `m` varies linearly, with the volume and the first moments
+//! of its particles,
+//!
+//! ```text
+//! chi_m(xi, eta) = s_m (1 + 3 X_m xi + 3 Y_m eta),   rho = sum_m chi_m rho_m
+//! ```
+//! where `s_m` is the material's share of the particles' volume and `(X_m, Y_m)` its centroid: the
+//! projection of the true density on linear functions, known without any guess between particles.
+//! What it leaves out works only on the curvature of the velocity. Shares smoothed by a kernel,
+//! which serve the viscosity, would carry the noise of the particles' places into the load: a
+//! level at rest inside a cell of 32 then moves with 3e-3 rho g a^2/eta at a viscosity contrast of
+//! 1000, and not at all with exact moments. `rho_m` is a quadratic fit where particles carry their
+//! density.
+
+use super::fit::{Degree, Fit};
+use super::quadrature::{Content, Quadrature};
+use crate::plan::material::Material;
+use crate::space::mesh::Mesh;
+use crate::space::particles::Particles;
+use crate::space::shape::GAUSS_3X3;
+
+/// Densities at the 3 x 3 Gauss points of each cell.
+pub struct Weight {
+    at_gauss: Vec<[f64; 9]>,
+    parts: Vec<Part>,
+}
+
+/// A material in a cell.
+#[derive(Clone, Default)]
+struct Part {
+    volume: f64,
+    /// Sum of volume times reference coordinates; then the centroid.
+    moment: [f64; 2],
+    density: Fit,
+}
+
+impl Weight {
+    pub fn new(mesh: &Mesh, materials: usize) -> Self {
+        Weight { at_gauss: vec![[0.0; 9]; mesh.cells()], parts: vec![Part::default(); materials] }
+    }
+
+    /// Evaluates all cells. `particles` sorted, `quadrature` of the same particles.
+    pub fn update(
+        &mut self,
+        mesh: &Mesh,
+        particles: &Particles,
+        materials: &[Material],
+        quadrature: &Quadrature,
+    ) {
+        for cell in 0..mesh.cells() {
+            self.at_gauss[cell] = match quadrature.content(cell) {
+                Content::Uniform { material, .. } => [materials[material as usize].density; 9],
+                Content::Mixed => {
+                    self.gather(mesh, cell, particles, materials);
+                    self.mixed(materials, quadrature.factors())
+                }
+                Content::Solid | Content::Unknown => [0.0; 9],
+            };
+        }
+    }
+
+    /// Mass at each Gauss point as a share of the cell's area, reference coordinates, shape
+    /// functions.
+    pub fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {
+        for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
+            f(g.weight * density, g.r, &g.shape.n);
+        }
+    }
+
+    fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
+        for part in &mut self.parts {
+            (part.volume, part.moment) = (0.0, [0.0; 2]);
+            part.density.clear();
+        }
+        for p in particles.of_cell(cell) {
+            let m = particles.material[p] as usize;
+            let (volume, part) = (particles.volume[p], &mut self.parts[m]);
+            let r = mesh.to_reference(cell, particles.position[p]);
+            part.volume += volume;
+            for c in 0..2 {
+                part.moment[c] += volume * r[c];
+            }
+            if let (Some(d), true) = (&particles.density, materials[m].carries_density) {
+                part.density.add(volume, r, d[p]);
+            }
+        }
+    }
+
+    fn mixed(&mut self, materials: &[Material], factors: &[f64]) -> [f64; 9] {
+        let total: f64 = self.parts.iter().zip(factors).map(|(p, f)| p.volume * f).sum();
+        // Shares add up to one at every point only if the centroids' mean is the cell's centre:
+        // all are shifted by what is missing.
+        let mut offset = [0.0; 2];
+        for (part, factor) in self.parts.iter_mut().zip(factors).filter(|(p, _)| p.volume > 0.0) {
+            part.moment = part.moment.map(|m| m / part.volume);
+            for c in 0..2 {
+                offset[c] += part.volume * factor / total * part.moment[c];
+            }
+        }
+        let mut density = [0.0; 9];
+        for ((part, factor), material) in self.parts.iter().zip(factors).zip(materials) {
+            if part.volume == 0.0 {
+                continue;
+            }
+            let share = part.volume * factor / total;
+            let [x, y] = [0, 1].map(|c| 3.0 * (part.moment[c] - offset[c]));
+            let fit = part.density.solve(Degree::Quadratic);
+            for (density, g) in density.iter_mut().zip(GAUSS_3X3.iter()) {
+                let here = fit.as_ref().map_or(material.density, |f| f.at(g.r));
+                *density += share * (1.0 + x * g.r[0] + y * g.r[1]) * here;
+            }
+        }
+        density
+    }
+}
