@@ -24,7 +24,7 @@ use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
 use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
-use crate::scene::{FieldFn, Integrator, Quadrature as Rule};
+use crate::scene::{Integrator, Quadrature as Rule};
 use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};

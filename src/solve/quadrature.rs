@@ -60,7 +60,7 @@ pub struct Quadrature {
     points: Vec<IntegrationPoint>,
     start: Vec<u32>,
     content: Vec<Content>,
-    /// Arithmetic mean viscosity of each cell; scales the penalty.
+    /// Mean viscosity of each cell's points; scales the penalty.
     pub mean_viscosity: Vec<f64>,
     /// Mean 1/B of each cell.
     pub compliance: Vec<f64>,

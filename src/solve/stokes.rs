@@ -10,8 +10,15 @@
 //! ```text
 //! ru = f - K u + B' p,   rp = B u + C p,   du = A^-1 (ru - B' W rp),   dp = -W (rp + B du)
 //! ```
-//! With `r = 1e4` and `eta` the arithmetic mean viscosity of the cell this takes 3-4 corrections
+//! With `r = 1e4` and `eta` the mean viscosity of the cell's points this takes 3-4 corrections
 //! at contrasts up to 1e6; a constant `r`, or a geometric mean, fails there.
+//!
+//! Once the forces balance (`ru = 0`), every correction keeps them balanced, and so does any sum of
+//! corrections: each new one is combined with those before it such that the divergence that
+//! remains is least (generalised conjugate residuals; Eisenstat, Elman and Schultz 1983). The
+//! pressure of a weak pocket in stiff surroundings, which single corrections of weight `r eta` of
+//! the pocket approach by a share `r eta/eta_stiff` each, is so found at once; the residuals are
+//! always computed afresh from the fields.
 
 use super::cholesky::{FactorError, SparseCholesky};
 use super::element::{
@@ -32,6 +39,11 @@ const PENALTY: f64 = 1e4;
 
 /// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
 const RIGID_SHARE: f64 = 1e-3;
+
+/// Forces that balance to this many tolerances count as balanced.
+const BALANCED: f64 = 10.0;
+/// Most corrections that a new one is combined with.
+const MOST_DIRECTIONS: usize = 6;
 
 /// When the corrections stop.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +88,7 @@ pub enum SolveError {
     Factor { source: FactorError, x: f64, y: f64, component: &'static str },
     #[error(
         "no convergence in {corrections} corrections: residual {residual:.1e}, \
-         divergence {divergence:.1e}; largest residual at ({x:.4e}, {y:.4e})"
+         divergence {divergence:.1e}; the worst is at ({x:.4e}, {y:.4e})"
     )]
     Stalled { corrections: u32, residual: f64, divergence: f64, x: f64, y: f64 },
     #[error("the solution is not finite after {corrections} corrections")]
@@ -135,7 +147,40 @@ struct Work<const D: usize> {
     residual: Residual<D>,
     /// Right-hand side and solution on the skeleton.
     skeleton: Vec<f64>,
-    correction: Vec<[f64; D]>,
+    correction: Correction<D>,
+    /// Corrections of this solution, of orthonormal divergence; the first `kept` are valid.
+    directions: Vec<Correction<D>>,
+    kept: usize,
+}
+
+/// A change of velocity (and rotation) and pressure.
+#[derive(Clone, Default)]
+struct Correction<const D: usize> {
+    velocity: Vec<[f64; D]>,
+    pressure: Vec<[f64; 3]>,
+    /// `B du + C dp`
+    divergence: Vec<[f64; 3]>,
+}
+
+impl<const D: usize> Correction<D> {
+    fn add_scaled(&mut self, factor: f64, o: &Correction<D>) {
+        fn add<const N: usize>(a: &mut [[f64; N]], factor: f64, b: &[[f64; N]]) {
+            for (a, b) in a.iter_mut().zip(b) {
+                for c in 0..N {
+                    a[c] += factor * b[c];
+                }
+            }
+        }
+        add(&mut self.velocity, factor, &o.velocity);
+        add(&mut self.pressure, factor, &o.pressure);
+        add(&mut self.divergence, factor, &o.divergence);
+    }
+
+    fn scale(&mut self, factor: f64) {
+        let all = self.velocity.iter_mut().flatten();
+        let all = all.chain(self.pressure.iter_mut().flatten());
+        all.chain(self.divergence.iter_mut().flatten()).for_each(|v| *v *= factor);
+    }
 }
 
 /// Residuals of a state, and powers that come with them.
@@ -225,6 +270,7 @@ impl<const D: usize> Stokes<D> {
         let clock = Instant::now();
         self.constraints.impose(&mut flow.velocity);
         let mut work = std::mem::take(&mut self.work);
+        work.kept = 0;
         let outcome =
             self.iterate(&Given { quadrature, load, stopping }, flow, &mut report, &mut work);
         self.work = work;
@@ -257,9 +303,12 @@ impl<const D: usize> Stokes<D> {
                 return Ok(());
             }
             if report.corrections == stopping.max_corrections {
-                return Err(self.stalled(residual, report));
+                return Err(self.stalled(residual, report, stopping.tolerance));
             }
-            self.correct(work, flow).map_err(|e| self.explain(e))?;
+            let balanced = report.residual <= BALANCED * stopping.tolerance;
+            self.correct(work).map_err(|e| self.explain(e))?;
+            self.combine(quadrature, work, balanced);
+            self.apply(work, flow);
             report.corrections += 1;
         }
     }
@@ -429,9 +478,11 @@ impl<const D: usize> Stokes<D> {
         power
     }
 
-    /// One correction; uses the residual up.
-    fn correct(&mut self, work: &mut Work<D>, flow: &mut Flow<D>) -> Result<(), FactorError> {
-        let Work { residual: r, skeleton: x, correction: du } = work;
+    /// One correction; uses the residual's forces up.
+    fn correct(&mut self, work: &mut Work<D>) -> Result<(), FactorError> {
+        let Work { residual: r, skeleton: x, correction, .. } = work;
+        let du = &mut correction.velocity;
+        correction.pressure.resize(self.mesh.cells(), [0.0; 3]);
         let force = &mut r.force;
         for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
             let divergence = Divergence::new(self.mesh.cell_size(cell));
@@ -483,15 +534,73 @@ impl<const D: usize> Stokes<D> {
             du[nodes[CENTRE]] = u;
             let bdu = Divergence::new(self.mesh.cell_size(cell)).apply(&nodes.map(|n| du[n]));
             for q in 0..3 {
-                flow.pressure[cell][q] -= built.penalty[q] * (r.divergence[cell][q] + bdu[q]);
+                correction.pressure[cell][q] = -built.penalty[q] * (r.divergence[cell][q] + bdu[q]);
             }
         }
-        for (u, du) in flow.velocity.iter_mut().zip(du.iter()) {
+        Ok(())
+    }
+
+    /// Combines a correction with those before it: of all sums of them the one that leaves the
+    /// least divergence.
+    fn combine(&self, quadrature: &Quadrature, work: &mut Work<D>, balanced: bool) {
+        if !balanced {
+            work.kept = 0;
+            return;
+        }
+        let mesh = &self.mesh;
+        let Work { residual, correction, directions, kept, .. } = work;
+        correction.divergence.resize(mesh.cells(), [0.0; 3]);
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let du = self.nodes[cell].map(|n| correction.velocity[n]);
+            let bdu = Divergence::new(mesh.cell_size(cell)).apply(&du);
+            let mass = pressure_mass(mesh.cell_area(cell));
+            for q in 0..3 {
+                let give = quadrature.compliance[cell] * mass[q] * correction.pressure[cell][q];
+                correction.divergence[cell][q] = bdu[q] + give;
+            }
+        }
+        for known in &directions[..*kept] {
+            let along = self.product(&known.divergence, &correction.divergence);
+            correction.add_scaled(-along, known);
+        }
+        let norm = self.product(&correction.divergence, &correction.divergence).sqrt();
+        if norm == 0.0 {
+            return;
+        }
+        correction.scale(1.0 / norm);
+        if *kept == MOST_DIRECTIONS {
+            directions.rotate_left(1);
+            *kept -= 1;
+        }
+        if directions.len() == *kept {
+            directions.push(Correction::default());
+        }
+        directions[*kept].clone_from(correction);
+        *kept += 1;
+        correction.scale(-self.product(&correction.divergence, &residual.divergence));
+    }
+
+    /// Inner product of two divergences.
+    fn product(&self, a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+        let cell = |c: usize| -> f64 {
+            let mass = pressure_mass(self.mesh.cell_area(c));
+            (0..3).map(|q| a[c][q] * b[c][q] / mass[q]).sum()
+        };
+        (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]).map(cell).sum()
+    }
+
+    fn apply(&self, work: &Work<D>, flow: &mut Flow<D>) {
+        let correction = &work.correction;
+        for (u, du) in flow.velocity.iter_mut().zip(&correction.velocity) {
             for c in 0..D {
                 u[c] += du[c];
             }
         }
-        Ok(())
+        for (p, dp) in flow.pressure.iter_mut().zip(&correction.pressure) {
+            for q in 0..3 {
+                p[q] += dp[q];
+            }
+        }
     }
 
     fn explain(&self, e: FactorError) -> SolveError {
@@ -505,13 +614,23 @@ impl<const D: usize> Stokes<D> {
         SolveError::Factor { source: e, x, y, component: ["u", "v", "w"][component] }
     }
 
-    fn stalled(&self, r: &Residual<D>, report: &Report) -> SolveError {
-        let worst = (0..self.mesh.nodes())
-            .flat_map(|n| (0..D).map(move |c| (n, c)))
-            .filter(|&(n, c)| !self.constraints.is_fixed(n, c) && self.diagonal[n][c] > 0.0)
-            .map(|(n, c)| (n, r.force[n][c].powi(2) / self.diagonal[n][c]))
-            .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-        let [x, y] = self.mesh.node_position(worst.0);
+    fn stalled(&self, r: &Residual<D>, report: &Report, tolerance: f64) -> SolveError {
+        let largest = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
+        let [x, y] = if report.residual > tolerance {
+            let worst = (0..self.mesh.nodes())
+                .flat_map(|n| (0..D).map(move |c| (n, c)))
+                .filter(|&(n, c)| !self.constraints.is_fixed(n, c) && self.diagonal[n][c] > 0.0)
+                .map(|(n, c)| (n, r.force[n][c].powi(2) / self.diagonal[n][c]))
+                .fold((0, 0.0), largest);
+            self.mesh.node_position(worst.0)
+        } else {
+            let density = |cell: usize| {
+                let sum: f64 = r.divergence[cell].iter().map(|d| d * d).sum();
+                (cell, sum / self.mesh.cell_area(cell))
+            };
+            let worst = (0..self.mesh.cells()).map(density).fold((0, 0.0), largest);
+            self.mesh.cell_centre(worst.0)
+        };
         SolveError::Stalled {
             corrections: report.corrections,
             residual: report.residual,
