@@ -4,14 +4,14 @@
 //! In a cell that regions divide, the particles of each material stand for exactly its part: their
 //! volumes add up to its area, and they are shifted (by less than their spacing) so that their
 //! centroid is its centroid. A part that no particle happens to lie in gets one of its own. Carried
-//! densities are changed a little so that the cell's fit to them ([`crate::solve::fit`]) is the
+//! densities are changed a little so that the cell's fit to them ([`crate::space::fit`]) is the
 //! fit to the field itself: at the start a level or a stratification has no noise of the
 //! particles' places.
 
 use super::sampling::{Filling, Sample, filling, samples};
 use crate::plan::{InitialDirector, Mark, Plan};
 use crate::scene::FieldFn;
-use crate::solve::fit::{Degree, Fit};
+use crate::space::fit::{Degree, Fit};
 use crate::space::particles::Particles;
 use crate::space::population::{Count, Population};
 use crate::space::shape::GAUSS_5;

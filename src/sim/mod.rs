@@ -31,6 +31,7 @@ use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};
 use crate::solve::weight::Weight;
 use crate::space::balance::Balance;
 use crate::space::flow::Flow;
+use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
 use crate::space::population::{Count, Population};
 use clock::{Limiter, next_step};
@@ -172,7 +173,11 @@ impl<const D: usize> Simulation<D> {
         }
         let mut sim = Simulation {
             quadrature: Quadrature::new(&mesh, plan.method.quadrature, plan.state.materials.len()),
-            weight: Weight::new(&mesh, plan.state.materials.len()),
+            weight: Weight::new(
+                &mesh,
+                Neighbours::new(&mesh, &plan.enclosure),
+                plan.state.materials.len(),
+            ),
             flow: Flow::zero(&mesh),
             previous: None,
             load: fixed_load.clone(),

@@ -3,7 +3,6 @@
 
 pub mod cholesky;
 pub mod element;
-pub mod fit;
 pub mod quadrature;
 pub mod stokes;
 pub mod weight;

@@ -9,10 +9,10 @@
 //! **Particles**. Each particle is an integration point with its own law and a weight
 //! proportional to its volume: the method of the source, for comparison.
 
-use super::fit::{Degree, Fit};
 use crate::laws::point::{Mixture, PointLaw};
 use crate::plan::material::{Material, Texture};
 use crate::scene::Quadrature as Rule;
+use crate::space::fit::{Degree, Fit};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_3, GAUSS_3X3, Shape};
@@ -490,7 +490,7 @@ impl Scratch {
                     continue;
                 }
                 let eta = match &viscosity_fit[m] {
-                    Some(fit) if material.carries_viscosity => fit.at_clipped(point.r).exp(),
+                    Some(fit) if material.carries_viscosity => fit.at_bounded(point.r).exp(),
                     _ => material.viscosity,
                 };
                 mixture.add(phi, &material.law(eta, &self.texture[9 * m + g]));

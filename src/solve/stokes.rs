@@ -40,8 +40,6 @@ const PENALTY: f64 = 1e4;
 /// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
 const RIGID_SHARE: f64 = 1e-3;
 
-/// Forces that balance to this many tolerances count as balanced.
-const BALANCED: f64 = 10.0;
 /// Most corrections that a new one is combined with.
 const MOST_DIRECTIONS: usize = 6;
 
@@ -305,7 +303,7 @@ impl<const D: usize> Stokes<D> {
             if report.corrections == stopping.max_corrections {
                 return Err(self.stalled(residual, report, stopping.tolerance));
             }
-            let balanced = report.residual <= BALANCED * stopping.tolerance;
+            let balanced = report.residual <= stopping.tolerance;
             self.correct(work).map_err(|e| self.explain(e))?;
             self.combine(quadrature, work, balanced);
             self.apply(work, flow);

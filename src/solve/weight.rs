@@ -12,17 +12,22 @@
 //! which serve the viscosity, would carry the noise of the particles' places into the load: a
 //! level at rest inside a cell of 32 then moves with 3e-3 rho g a^2/eta at a viscosity contrast of
 //! 1000, and not at all with exact moments. `rho_m` is a quadratic fit where particles carry their
-//! density.
+//! density; where a cell's own do not determine it, those of its neighbours help.
 
-use super::fit::{Degree, Fit};
 use super::quadrature::{Content, Quadrature};
 use crate::plan::material::Material;
+use crate::space::fit::{Degree, Fit, Polynomial};
 use crate::space::mesh::Mesh;
+use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
 use crate::space::shape::GAUSS_3X3;
 
+/// Weight of a neighbour's particle in a fit, beside the cell's own: less, since it is farther.
+const LENT: f64 = 0.1;
+
 /// Densities at the 3 x 3 Gauss points of each cell.
 pub struct Weight {
+    neighbours: Neighbours,
     at_gauss: Vec<[f64; 9]>,
     parts: Vec<Part>,
 }
@@ -37,8 +42,12 @@ struct Part {
 }
 
 impl Weight {
-    pub fn new(mesh: &Mesh, materials: usize) -> Self {
-        Weight { at_gauss: vec![[0.0; 9]; mesh.cells()], parts: vec![Part::default(); materials] }
+    pub fn new(mesh: &Mesh, neighbours: Neighbours, materials: usize) -> Self {
+        Weight {
+            neighbours,
+            at_gauss: vec![[0.0; 9]; mesh.cells()],
+            parts: vec![Part::default(); materials],
+        }
     }
 
     /// Evaluates all cells. `particles` sorted, `quadrature` of the same particles.
@@ -54,6 +63,7 @@ impl Weight {
                 Content::Uniform { material, .. } => [materials[material as usize].density; 9],
                 Content::Mixed => {
                     self.gather(mesh, cell, particles, materials);
+                    self.help(mesh, cell, particles, materials);
                     self.mixed(materials, quadrature.factors())
                 }
                 Content::Solid | Content::Unknown => [0.0; 9],
@@ -84,6 +94,25 @@ impl Weight {
             }
             if let (Some(d), true) = (&particles.density, materials[m].carries_density) {
                 part.density.add(volume, r, d[p]);
+            }
+        }
+    }
+
+    /// Lends particles of neighbouring cells to fits that a cell's own do not determine.
+    fn help(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
+        let Some(density) = &particles.density else { return };
+        for (m, part) in self.parts.iter_mut().enumerate() {
+            let lacks = |p: Polynomial| p.degree < Degree::Quadratic && p.varies();
+            if !materials[m].carries_density
+                || !part.density.solve(Degree::Quadratic).is_some_and(lacks)
+            {
+                continue;
+            }
+            for p in self.neighbours.of(cell).flat_map(|n| particles.of_cell(n)) {
+                if particles.material[p] as usize == m {
+                    let r = mesh.to_near_reference(cell, particles.position[p]);
+                    part.density.borrow(LENT * particles.volume[p], r, density[p]);
+                }
             }
         }
     }

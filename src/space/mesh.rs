@@ -162,6 +162,15 @@ impl Mesh {
         let [hx, hy] = self.cell_size(cell);
         [2.0 * (p[0] - cx) / hx, 2.0 * (p[1] - cy) / hy]
     }
+    /// The same for a point of a neighbouring cell, on the near side of periodic axes.
+    pub fn to_near_reference(&self, cell: usize, p: [f64; 2]) -> [f64; 2] {
+        let centre = self.cell_centre(cell);
+        let near = |axis: &Axis, at: f64, middle: f64| {
+            let turns = if axis.periodic { ((at - middle) / axis.length()).round() } else { 0.0 };
+            at - turns * axis.length()
+        };
+        self.to_reference(cell, [near(&self.x, p[0], centre[0]), near(&self.y, p[1], centre[1])])
+    }
     pub fn from_reference(&self, cell: usize, r: [f64; 2]) -> [f64; 2] {
         let [cx, cy] = self.cell_centre(cell);
         let [hx, hy] = self.cell_size(cell);

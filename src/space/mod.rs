@@ -2,8 +2,10 @@
 
 pub mod balance;
 pub mod constraints;
+pub mod fit;
 pub mod flow;
 pub mod mesh;
+pub mod neighbours;
 pub mod numbering;
 pub mod particles;
 pub mod population;

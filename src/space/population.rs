@@ -6,8 +6,9 @@
 //! centroid are kept material by material (so a level at rest stays there, and no potential energy
 //! is made); directors are averaged as axes.
 
-use super::balance::open_faces;
+use super::fit::{Degree, Fit, Polynomial};
 use super::mesh::Mesh;
+use super::neighbours::Neighbours;
 use super::particles::Particles;
 use super::seeding::Seeding;
 use super::walls::Enclosure;
@@ -33,19 +34,12 @@ pub struct Count {
 #[derive(Clone, Debug)]
 pub struct Population {
     seeding: Seeding,
-    /// Cells across faces without walls.
-    neighbours: Vec<Vec<u32>>,
+    neighbours: Neighbours,
 }
 
 impl Population {
     pub fn new(mesh: &Mesh, enclosure: &Enclosure, seeding: Seeding) -> Self {
-        let mut neighbours = vec![Vec::new(); mesh.cells()];
-        for face in open_faces(mesh, enclosure) {
-            let [a, b] = face.cells;
-            neighbours[a as usize].push(b);
-            neighbours[b as usize].push(a);
-        }
-        Population { seeding, neighbours }
+        Population { seeding, neighbours: Neighbours::new(mesh, enclosure) }
     }
 
     /// Restores the bounds. `particles` must be sorted, and are sorted on return.
@@ -76,9 +70,16 @@ impl Population {
                 particles.volume[parent] *= 0.5;
                 particles.duplicate(parent);
                 let child = particles.len() - 1;
-                particles.position[child] = mesh.from_reference(cell, gap);
                 members.push(child);
-                keep_centroid(mesh, particles, cell, &members, (parent, child));
+                let kin: Vec<usize> = members
+                    .iter()
+                    .copied()
+                    .filter(|&p| particles.material[p] == particles.material[child])
+                    .collect();
+                let fields = CarriedFields::new(mesh, particles, cell, &kin);
+                particles.position[child] = mesh.from_reference(cell, gap);
+                keep_centroid(mesh, particles, cell, &kin, (parent, child));
+                fields.follow(mesh, particles, cell, &kin);
                 count.splits += 1;
             }
         }
@@ -126,9 +127,10 @@ impl Population {
 
     /// Refills an empty cell with half of the largest particle of its neighbours.
     fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> bool {
-        let donor = self.neighbours[cell]
-            .iter()
-            .flat_map(|&n| particles.of_cell(n as usize))
+        let donor = self
+            .neighbours
+            .of(cell)
+            .flat_map(|n| particles.of_cell(n))
             .max_by(|&a, &b| particles.volume[a].total_cmp(&particles.volume[b]));
         let Some(donor) = donor else { return false };
         particles.volume[donor] *= 0.5;
@@ -185,26 +187,65 @@ fn nearest(
         .unwrap_or(members[0])
 }
 
-/// Shifts all members of the kind of a parent and its child, whose volume came from the parent's
-/// place, such that their centroid is what it was; none leaves the cell.
+/// Shifts a parent, its child, whose volume came from the parent's place, and all others of their
+/// kind in the cell such that their centroid is what it was; none leaves the cell.
 fn keep_centroid(
     mesh: &Mesh,
     particles: &mut Particles,
     cell: usize,
-    members: &[usize],
+    kin: &[usize],
     (parent, child): (usize, usize),
 ) {
-    let kind = particles.material[child];
-    let kin = || members.iter().copied().filter(|&p| particles.material[p] == kind);
-    let volume: f64 = kin().map(|p| particles.volume[p]).sum();
+    let volume: f64 = kin.iter().map(|&p| particles.volume[p]).sum();
     let share = particles.volume[child] / volume;
     let shift =
         [0, 1].map(|c| share * (particles.position[parent][c] - particles.position[child][c]));
-    let kin: Vec<usize> = kin().collect();
-    for p in kin {
+    for &p in kin {
         let [x, y] = particles.position[p];
         let r = mesh.to_reference(cell, [x + shift[0], y + shift[1]]);
         particles.position[p] = mesh.from_reference(cell, r.map(|c| c.clamp(-INSIDE, INSIDE)));
+    }
+}
+
+/// Fields that particles of one kind carry in a cell, as polynomials: particles that are moved
+/// without flow take the field's difference between their places with them. Without it, a
+/// child has its parent's density at a place where the density is another, a first-order error.
+struct CarriedFields {
+    density: Option<Polynomial>,
+    log_viscosity: Option<Polynomial>,
+    /// Where they were, in reference coordinates.
+    places: Vec<[f64; 2]>,
+}
+
+impl CarriedFields {
+    fn new(mesh: &Mesh, particles: &Particles, cell: usize, kin: &[usize]) -> Self {
+        let places: Vec<_> =
+            kin.iter().map(|&p| mesh.to_reference(cell, particles.position[p])).collect();
+        let fit = |value: &dyn Fn(usize) -> f64| {
+            let mut fit = Fit::default();
+            for (&p, &r) in kin.iter().zip(&places) {
+                fit.add(particles.volume[p], r, value(p));
+            }
+            fit.solve(Degree::Quadratic)
+        };
+        CarriedFields {
+            density: particles.density.as_ref().and_then(|d| fit(&|p| d[p])),
+            log_viscosity: particles.viscosity.as_ref().and_then(|v| fit(&|p| v[p].ln())),
+            places,
+        }
+    }
+
+    fn follow(&self, mesh: &Mesh, particles: &mut Particles, cell: usize, kin: &[usize]) {
+        for (&p, &before) in kin.iter().zip(&self.places) {
+            let now = mesh.to_reference(cell, particles.position[p]);
+            let change = |f: &Polynomial| f.at_bounded(now) - f.at_bounded(before);
+            if let (Some(column), Some(f)) = (&mut particles.density, &self.density) {
+                column[p] += change(f);
+            }
+            if let (Some(column), Some(f)) = (&mut particles.viscosity, &self.log_viscosity) {
+                column[p] *= change(f).exp();
+            }
+        }
     }
 }
 

@@ -32,6 +32,8 @@ pub enum Degree {
 #[derive(Clone, Debug, Default)]
 pub struct Fit {
     points: Vec<Valued>,
+    /// Points beyond these many were borrowed from neighbours.
+    own: usize,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -56,9 +58,16 @@ pub struct Polynomial {
 impl Fit {
     pub fn clear(&mut self) {
         self.points.clear();
+        self.own = 0;
     }
 
     pub fn add(&mut self, weight: f64, r: [f64; 2], value: f64) {
+        self.points.push(Valued { weight, r, value });
+        self.own = self.points.len();
+    }
+
+    /// Adds a point that does not count in the mean.
+    pub fn borrow(&mut self, weight: f64, r: [f64; 2], value: f64) {
         self.points.push(Valued { weight, r, value });
     }
 
@@ -87,6 +96,12 @@ impl Fit {
             out.stretch[c] = if deviation > LEAST_DEVIATION { 1.0 / deviation } else { 0.0 };
         }
         out.degree = self.fill(&mut out, most, total);
+        if self.own < self.points.len() {
+            let own = &self.points[..self.own];
+            let weight: f64 = own.iter().map(|p| p.weight).sum();
+            let missing: f64 = own.iter().map(|p| p.weight * (p.value - out.at(p.r))).sum();
+            out.coefficient[0] += missing / weight;
+        }
         Some(out)
     }
 
@@ -175,13 +190,21 @@ impl Polynomial {
         [1.0, u, v, u * u, u * v, v * v]
     }
 
+    /// The values it was fitted to were not all the same.
+    pub fn varies(&self) -> bool {
+        self.low < self.high
+    }
+
     pub fn at(&self, r: [f64; 2]) -> f64 {
         self.terms(r).iter().zip(&self.coefficient).map(|(t, c)| t * c).sum()
     }
 
-    /// Kept within the range of the values it was fitted to.
-    pub fn at_clipped(&self, r: [f64; 2]) -> f64 {
-        self.at(r).clamp(self.low, self.high)
+    /// Kept near the range of the values it was fitted to: half of it beyond either end, which a
+    /// corner of the cell reaches when its points are at random places. Without that half, SolKz
+    /// with 16 random particles has three times the velocity error at 128 cells.
+    pub fn at_bounded(&self, r: [f64; 2]) -> f64 {
+        let margin = 0.5 * (self.high - self.low);
+        self.at(r).clamp(self.low - margin, self.high + margin)
     }
 }
 
