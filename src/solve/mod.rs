@@ -3,5 +3,7 @@
 
 pub mod cholesky;
 pub mod element;
+pub mod interface;
+pub mod laminate;
 pub mod quadrature;
 pub mod stokes;
