@@ -58,6 +58,15 @@ pub struct PointLaw {
     pub couple: f64,
 }
 
+impl PointLaw {
+    /// The law with `f` of its viscosity, but all of its rotation.
+    pub fn with_viscosity_scaled(&self, f: f64) -> Self {
+        let mut shear = Sym2::default();
+        shear.add_scaled(f, &self.shear);
+        PointLaw { shear, dilation: f * self.dilation, ..*self }
+    }
+}
+
 /// How the materials that share a cell combine at an integration point.
 ///
 /// - Deviatoric viscosity: harmonic, `S^-1 = sum phi_m S_m^-1`, so a cell cut by an interface

@@ -425,6 +425,9 @@ pub enum Placement {
 pub enum Quadrature {
     /// Gauss points that see the local harmonic mixture of the cell's particles.
     Mixture,
+    /// The same, but in cells cut by two materials shear along the interface is in series,
+    /// stretch along it in parallel.
+    Laminate,
     /// Particles as the only integration points: the method of the source.
     Particles,
 }

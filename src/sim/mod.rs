@@ -419,7 +419,7 @@ impl<const D: usize> Simulation<D> {
                 }
             };
             match plan.method.quadrature {
-                Rule::Mixture => self.weight.for_points(cell, &mut add),
+                Rule::Mixture | Rule::Laminate => self.weight.for_points(cell, &mut add),
                 Rule::Particles => self.quadrature.for_points(cell, |p, shape| {
                     add(p.weight * p.density, p.r, &shape.n);
                 }),

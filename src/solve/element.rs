@@ -8,7 +8,7 @@
 //! Local unknowns are ordered component by component: `9 c + a` for component `c` (u, v, w) of
 //! node `a`. `D` is 2 for the classical continuum, 3 with Cosserat rotation.
 
-use super::quadrature::{IntegrationPoint, Quadrature};
+use super::quadrature::{CutStiffness, IntegrationPoint, Quadrature};
 use crate::laws::point::PointLaw;
 use crate::space::shape::{
     CENTRE, D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, N_AT_GAUSS, NODES,
@@ -218,9 +218,25 @@ pub struct Internal<const D: usize> {
 impl<const D: usize> Internal<D> {
     /// Of a cell of this size with nodal values `u`.
     pub fn new(quadrature: &Quadrature, cell: usize, size: [f64; 2], u: &Nodal<D>) -> Self {
-        match quadrature.gauss_points(cell) {
-            Some(points) => Internal::at_gauss_points(points, size, u),
-            None => Internal::at_any_points(quadrature, cell, size, u),
+        let Some(points) = quadrature.gauss_points(cell) else {
+            return Internal::at_any_points(quadrature, cell, size, u);
+        };
+        let Some(cut) = quadrature.cut(cell) else {
+            return Internal::at_gauss_points(points, size, u);
+        };
+        let mut rest = *points;
+        rest.iter_mut().for_each(|p| p.law = p.law.with_viscosity_scaled(cut.rest));
+        let mut out = Internal::at_gauss_points(&rest, size, u);
+        out.add_cut(cut, u);
+        out
+    }
+
+    fn add_cut(&mut self, cut: &CutStiffness, u: &Nodal<D>) {
+        let flat: [f64; 2 * NODES] = std::array::from_fn(|j| u[j % NODES][j / NODES]);
+        for (i, row) in cut.matrix.iter().enumerate() {
+            let force: f64 = row.iter().zip(&flat).map(|(k, u)| k * u).sum();
+            self.force[i % NODES][i / NODES] += force;
+            self.dissipation += force * flat[i];
         }
     }
 
@@ -276,6 +292,15 @@ pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &Point
                     row[2 * NODES + b] += t.w * s.n[b];
                 }
             }
+        }
+    }
+}
+
+/// Adds the stiffness of a cut cell, on and below the diagonal of components.
+pub fn add_cut_stiffness(k: &mut Matrix, cut: &CutStiffness) {
+    for (i, row) in cut.matrix.iter().enumerate() {
+        for j in 0..NODES * (i / NODES + 1) {
+            k[i][j] += row[j];
         }
     }
 }

@@ -3,6 +3,8 @@
 
 pub mod cholesky;
 pub mod element;
+pub mod interface;
+pub mod laminate;
 pub mod quadrature;
 pub mod stokes;
 pub mod weight;

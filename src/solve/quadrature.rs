@@ -6,16 +6,23 @@
 //! [`Mixture`] says. A cell of one uniform material sees that law exactly, whatever its
 //! particles' places, so its element matrix is a constant.
 //!
+//! **Laminate**. The same, but in cells that hold two materials the viscous stiffness is that of
+//! [`laminate`](super::laminate), with the interface that [`interface`](super::interface) finds.
+//! Where it finds none to trust (drops below a cell, three materials) the mixture stays. Rotation,
+//! density and pictures are those of the mixture.
+//!
 //! **Particles**. Each particle is an integration point with its own law and a weight
 //! proportional to its volume: the method of the source, for comparison.
 
+use super::interface::{Interface, Surroundings};
+use super::laminate::{self, Cut, VelocityMatrix};
 use crate::laws::point::{Mixture, PointLaw};
 use crate::plan::material::{Material, Texture};
 use crate::scene::Quadrature as Rule;
 use crate::space::fit::{Degree, Fit};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
-use crate::space::shape::{GAUSS_3, GAUSS_3X3, Shape};
+use crate::space::shape::{GAUSS_3, GAUSS_3X3, GAUSS_6X6, SUBPOINTS, Shape};
 
 /// Width of the fraction kernel in cells: 0.4 was the best of those measured.
 const KERNEL_WIDTH: f64 = 0.4;
@@ -54,12 +61,22 @@ pub enum Content {
     Unknown,
 }
 
+/// Viscous stiffness of a cell cut by an interface.
+#[derive(Clone)]
+pub struct CutStiffness {
+    pub matrix: VelocityMatrix,
+    /// Share of the viscosity that the integration points still have.
+    pub rest: f64,
+}
+
 /// Integration points of all cells, and means the solver needs.
 pub struct Quadrature {
     rule: Rule,
     points: Vec<IntegrationPoint>,
     start: Vec<u32>,
     content: Vec<Content>,
+    /// Of cut cells, by the laminate rule.
+    cut: Vec<Option<Box<CutStiffness>>>,
     /// Mean viscosity of each cell's points; scales the penalty.
     pub mean_viscosity: Vec<f64>,
     /// Mean 1/B of each cell.
@@ -84,7 +101,7 @@ impl Quadrature {
     pub fn new(mesh: &Mesh, rule: Rule, materials: usize) -> Self {
         let cells = mesh.cells();
         let (points, start) = match rule {
-            Rule::Mixture => {
+            Rule::Mixture | Rule::Laminate => {
                 let mut points = vec![IntegrationPoint::default(); 9 * cells];
                 for (k, point) in points.iter_mut().enumerate() {
                     let g = &GAUSS_3X3[k % 9];
@@ -99,6 +116,7 @@ impl Quadrature {
             points,
             start,
             content: vec![Content::Unknown; cells],
+            cut: vec![None; cells],
             mean_viscosity: vec![0.0; cells],
             compliance: vec![0.0; cells],
             fractions: vec![0.0; cells * materials],
@@ -137,16 +155,22 @@ impl Quadrature {
     /// The cell's nine points if they are those of the Gauss rule, row by row from below.
     pub fn gauss_points(&self, cell: usize) -> Option<&[IntegrationPoint; 9]> {
         match self.rule {
-            Rule::Mixture => self.points[9 * cell..9 * cell + 9].try_into().ok(),
+            Rule::Mixture | Rule::Laminate => self.points[9 * cell..9 * cell + 9].try_into().ok(),
             Rule::Particles => None,
         }
+    }
+
+    /// Viscous stiffness that a cell has besides that of its integration points, which then have
+    /// only a part of theirs.
+    pub fn cut(&self, cell: usize) -> Option<&CutStiffness> {
+        self.cut[cell].as_deref()
     }
 
     /// Integration points of a cell with their shape functions.
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(&IntegrationPoint, &Shape)) {
         let range = self.start[cell] as usize..self.start[cell + 1] as usize;
         match self.rule {
-            Rule::Mixture => {
+            Rule::Mixture | Rule::Laminate => {
                 for (p, g) in self.points[range].iter().zip(GAUSS_3X3.iter()) {
                     f(p, &g.shape);
                 }
@@ -202,7 +226,7 @@ impl Quadrature {
             let unchanged = content != Content::Mixed && content == self.content[cell];
             self.content[cell] = content;
             match self.rule {
-                Rule::Mixture => {
+                Rule::Mixture | Rule::Laminate => {
                     if !unchanged {
                         self.mix(mesh, cell, particles, materials, &mut scratch);
                     }
@@ -210,7 +234,7 @@ impl Quadrature {
                 Rule::Particles => self.list(mesh, cell, particles, materials),
             }
         }
-        if self.rule == Rule::Mixture {
+        if self.rule != Rule::Particles {
             self.keep_volumes(mesh, particles);
         }
         Ok(())
@@ -270,6 +294,7 @@ impl Quadrature {
         materials: &[Material],
         scratch: &mut Scratch,
     ) {
+        self.cut[cell] = None;
         match self.content[cell] {
             Content::Uniform { material, .. } => {
                 let law = self.fill_uniform(cell, material as usize, materials);
@@ -285,6 +310,16 @@ impl Quadrature {
                     scratch.evaluate(points, fractions, materials, &self.factors);
                 self.mean_viscosity[cell] = viscosity;
                 self.compliance[cell] = compliance;
+                if self.rule == Rule::Laminate {
+                    self.cut[cell] = scratch.laminate(mesh, cell, particles, materials);
+                    if let Some(cut) = &self.cut[cell] {
+                        // In parallel: the stiff part counts. With the mixture's mean as the
+                        // scale of the penalty layers of contrast 1e8 do not converge.
+                        let arithmetic = scratch.arithmetic_viscosity(materials);
+                        self.mean_viscosity[cell] =
+                            cut.rest * viscosity + (1.0 - cut.rest) * arithmetic;
+                    }
+                }
             }
             Content::Solid | Content::Unknown => {}
         }
@@ -393,6 +428,9 @@ struct Scratch {
     /// Per material.
     volume: Vec<f64>,
     log_viscosity: Vec<Fit>,
+    /// Of all of the cell's particles, by material.
+    cell_texture: Vec<Texture>,
+    surroundings: Surroundings,
 }
 
 impl Scratch {
@@ -402,6 +440,8 @@ impl Scratch {
             texture: vec![Texture::default(); 9 * materials],
             volume: vec![0.0; materials],
             log_viscosity: vec![Fit::default(); materials],
+            cell_texture: vec![Texture::default(); materials],
+            surroundings: Surroundings::default(),
         }
     }
 
@@ -410,6 +450,7 @@ impl Scratch {
         self.texture.fill(Texture::default());
         self.volume.fill(0.0);
         self.log_viscosity.iter_mut().for_each(Fit::clear);
+        self.cell_texture.fill(Texture::default());
         for p in particles.of_cell(cell) {
             let m = particles.material[p] as usize;
             let volume = particles.volume[p];
@@ -421,6 +462,9 @@ impl Scratch {
             let kx = GAUSS_3.map(|g| kernel(r[0], g));
             let ky = GAUSS_3.map(|g| kernel(r[1], g));
             self.volume[m] += volume;
+            if let (Some(d), Some(_)) = (&particles.director, materials[m].layer_viscosity) {
+                self.cell_texture[m].add(volume, d[p]);
+            }
             for g in 0..9 {
                 let w = volume * kx[g % 3] * ky[g / 3];
                 self.weight[9 * m + g] += w;
@@ -466,6 +510,52 @@ impl Scratch {
             if worst < MATCHING_TOLERANCE {
                 break;
             }
+        }
+    }
+
+    /// Stiffness of a cell of two materials whose interface can be told.
+    fn laminate(
+        &mut self,
+        mesh: &Mesh,
+        cell: usize,
+        particles: &Particles,
+        materials: &[Material],
+    ) -> Option<Box<CutStiffness>> {
+        let mut present = (0..materials.len()).filter(|&m| self.volume[m] > 0.0);
+        let between = [present.next()?, present.next()?];
+        if present.next().is_some() {
+            return None;
+        }
+        let [a, b] = between.map(|m| self.volume[m]);
+        let interface = self.surroundings.interface(mesh, particles, cell, between, b / (a + b))?;
+        if interface.trust == 0.0 {
+            return None;
+        }
+        let sides = between.map(|m| self.law_in_cell(m, &materials[m]));
+        let mut matrix = laminate::matrix(&Cut {
+            interface: &interface,
+            sides: &sides,
+            size: mesh.cell_size(cell),
+        });
+        let Interface { trust, .. } = interface;
+        matrix.iter_mut().flatten().for_each(|k| *k *= trust);
+        Some(Box::new(CutStiffness { matrix, rest: 1.0 - trust }))
+    }
+
+    /// Mean viscosity of the cell's materials by volume.
+    fn arithmetic_viscosity(&self, materials: &[Material]) -> f64 {
+        let total: f64 = self.volume.iter().sum();
+        self.volume.iter().zip(materials).map(|(v, m)| v / total * m.viscosity).sum()
+    }
+
+    /// Law of one material over the whole cell.
+    fn law_in_cell(&self, m: usize, material: &Material) -> [PointLaw; SUBPOINTS] {
+        let texture = &self.cell_texture[m];
+        match self.log_viscosity[m].solve(Degree::Quadratic) {
+            Some(fit) if material.carries_viscosity => {
+                std::array::from_fn(|q| material.law(fit.at_bounded(GAUSS_6X6[q].r).exp(), texture))
+            }
+            _ => [material.law(material.viscosity, texture); SUBPOINTS],
         }
     }
 

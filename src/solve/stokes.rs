@@ -23,7 +23,7 @@
 use super::cholesky::{FactorError, SparseCholesky};
 use super::element::{
     Condensed, Divergence, Internal, LOCAL, Matrix, Nodal, PointShape, SKELETON_NODES,
-    add_stiffness, mirror, pair, pressure_mass,
+    add_cut_stiffness, add_stiffness, mirror, pair, pressure_mass,
 };
 use super::quadrature::{Content, Quadrature};
 use crate::space::constraints::Constraints;
@@ -335,9 +335,14 @@ impl<const D: usize> Stokes<D> {
         let size = self.mesh.cell_size(cell);
         let area = size[0] * size[1];
         let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
+        let cut = quadrature.cut(cell);
         quadrature.for_points(cell, |p, shape| {
-            add_stiffness::<D>(&mut k, &PointShape::new(shape, size), &p.law, p.weight * area);
+            let law = cut.map_or(p.law, |cut| p.law.with_viscosity_scaled(cut.rest));
+            add_stiffness::<D>(&mut k, &PointShape::new(shape, size), &law, p.weight * area);
         });
+        if let Some(cut) = cut {
+            add_cut_stiffness(&mut k, cut);
+        }
         let mass = pressure_mass(area);
         let give = 1.0 / (PENALTY * quadrature.mean_viscosity[cell]) + quadrature.compliance[cell];
         let out = &mut self.cells[cell];
@@ -542,7 +547,6 @@ impl<const D: usize> Stokes<D> {
     /// least divergence.
     fn combine(&self, quadrature: &Quadrature, work: &mut Work<D>, balanced: bool) {
         if !balanced {
-            work.kept = 0;
             return;
         }
         let mesh = &self.mesh;

@@ -179,6 +179,23 @@ impl Mesh {
     pub fn wrap(&self, p: [f64; 2]) -> [f64; 2] {
         [self.x.wrap(p[0]), self.y.wrap(p[1])]
     }
+    /// The up to nine cells that share a corner with a cell, itself included; across periodic seams.
+    pub fn block(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
+        let (i, j) = self.cell_ij(cell);
+        let near = |axis: &Axis, k: usize| {
+            let last = axis.cells() - 1;
+            let below = if k > 0 { Some(k - 1) } else { axis.periodic.then_some(last) };
+            let above = if k < last { Some(k + 1) } else { axis.periodic.then_some(0) };
+            // A periodic axis of one or two cells has no third.
+            let below = below.filter(|&b| b != k);
+            let above = above.filter(|&a| a != k && Some(a) != below);
+            [below, Some(k), above]
+        };
+        let (x, y) = (near(&self.x, i), near(&self.y, j));
+        y.into_iter()
+            .flatten()
+            .flat_map(move |j| x.into_iter().flatten().map(move |i| self.cell(i, j)))
+    }
     /// The up to four neighbours across faces, periodic ones included.
     pub fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
         let (i, j) = self.cell_ij(cell);

@@ -72,6 +72,28 @@ pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
     })
 });
 
+/// Points of [`GAUSS_6X6`].
+pub const SUBPOINTS: usize = 36;
+
+/// Abscissae and weights (adding up to one half) of the positive half of the six-point rule.
+const GAUSS_6: [(f64, f64); 3] = [
+    (0.238_619_186_083_196_9, 0.233_956_967_286_345_5),
+    (0.661_209_386_466_264_5, 0.180_380_786_524_069_3),
+    (0.932_469_514_203_152_1, 0.085_662_246_189_585_2),
+];
+
+/// A 6 x 6 rule that resolves what cuts through a cell.
+pub static GAUSS_6X6: LazyLock<[GaussPoint; SUBPOINTS]> = LazyLock::new(|| {
+    let point = |k: usize| {
+        let (x, w) = GAUSS_6[if k < 3 { 2 - k } else { k - 3 }];
+        (if k < 3 { -x } else { x }, w)
+    };
+    std::array::from_fn(|g| {
+        let ((x, wx), (y, wy)) = (point(g % 6), point(g / 6));
+        GaussPoint { r: [x, y], weight: wx * wy, shape: Shape::at([x, y]) }
+    })
+});
+
 /// The nine shape functions at the nine points of [`GAUSS_3X3`], as plain tables: loops over
 /// either index vectorise. By `[node][point]` they interpolate, by `[point][node]` they test.
 pub struct Table {
@@ -155,6 +177,8 @@ mod tests {
                 let three: f64 = GAUSS_3X3.iter().map(|g| g.weight * g.r[0].powi(degree)).sum();
                 assert!((three - exact).abs() < 1e-14, "degree {degree}");
             }
+            let six: f64 = GAUSS_6X6.iter().map(|g| g.weight * g.r[0].powi(degree)).sum();
+            assert!((six - exact).abs() < 1e-14, "degree {degree}");
         }
     }
 }

@@ -1,0 +1,288 @@
+//! Stiffness of a cell cut by an interface, as a laminate: what shears along the interface is in
+//! series, what stretches along it in parallel.
+//!
+//! A biquadratic velocity cannot kink inside a cell. Integrated as it stands it locks: the soft
+//! part may not move where the stiff part does not. With the normal `n` and the tangent `t` of the
+//! interface, `e = -2 D_tt` and `g = 2 D_nt`, the true flow has
+//!
+//! ```text
+//! D_tt continuous, its stress discontinuous;   sigma_nt continuous, its rate g discontinuous;
+//! sigma_nn = -p + ... continuous.
+//! ```
+//! Every law is `a e^2 + b (g + k e)^2` with `b = S_gg`, `k = S_eg / b`, `a = S_ee - S_eg^2 / b`
+//! (`a = b = eta`, `k = 0` if isotropic). The cell's power is a sum of squares,
+//!
+//! ```text
+//! max over s in P1 of  2 int s (g + k e) - int s^2 / b      shear stress s along the interface
+//! + int a (R e)^2       R e: least squares fit of e by 1 and t.x, weighted by a
+//! + c b_h int |(1 - P)(g + k e)|^2 + c a_h int |(1 - R) e|^2 + d beta_h int tr(D)^2
+//! ```
+//! with integrals of a, b, k over the true shape of either side, `P` the L2 projection on P1, and
+//! harmonic means `b_h`, `a_h`, `beta_h`: what the fits leave out is held by the softer part.
+//! All terms are squares with positive weights, so the matrix is positive semi-definite whatever
+//! the particles do, and definite but for rigid motions.
+//!
+//! **Pressure.** An incompressible flow has `D_nn - D_tt = -2 D_tt`, yet the choice decides what the
+//! multiplier of `div u` means. With `D_nn - D_tt` it is the mean stress, which jumps with the
+//! viscosity, and a linear pressure cannot jump inside a cell; with `-2 D_tt` it is `-sigma_nn`,
+//! which does not. Layers stretched along themselves are 8 times as accurate for it.
+//!
+//! **Uniform limit.** With the contrast `r = min(a_h / a_mean, b_h / b_mean)`, `e` is
+//! `D_nn - D_tt - (1 - r^2) tr D`, `c = 0.3 + 0.7 r`, `d = 3 - 2 r`: equal laws give the standard
+//! matrix, term by term.
+//!
+//! Measured on inclusions, layers and walls of contrast 1e3 and 1e6 at 16 to 64 cells: errors of
+//! 0.5-0.9 of the local harmonic mixture's; `c = 1` adds half, `d = 1` doubles the error of weak
+//! inclusions at few cells, `d = 10` that of strong ones.
+
+use super::element::PointShape;
+use super::interface::Interface;
+use crate::laws::point::{PointLaw, Sym2};
+use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
+
+/// Velocity unknowns of a cell, component by component.
+const N: usize = 2 * NODES;
+/// A number for every velocity unknown: a linear form.
+type Row = [f64; N];
+/// Stiffness on the velocity of a cell.
+pub type VelocityMatrix = [[f64; N]; N];
+
+/// c and d at infinite contrast.
+const LOOSE: f64 = 0.3;
+const DILATION: f64 = 3.0;
+
+/// A cell cut in two.
+pub struct Cut<'a> {
+    pub interface: &'a Interface,
+    /// Laws of either side at the points of [`GAUSS_6X6`].
+    pub sides: &'a [[PointLaw; SUBPOINTS]; 2],
+    pub size: [f64; 2],
+}
+
+/// The directions of `e` and `g` among `(D_xx - D_yy, 2 D_xy)`.
+struct Frame {
+    e: [f64; 2],
+    g: [f64; 2],
+    /// Tangent.
+    t: [f64; 2],
+    /// `1 - r^2`: how much of the trace `e` lacks.
+    lack: f64,
+}
+
+impl Frame {
+    fn new([nx, ny]: [f64; 2]) -> Self {
+        let (c, s) = (nx * nx - ny * ny, 2.0 * nx * ny);
+        Frame { e: [c, s], g: [-s, c], t: [-ny, nx], lack: 0.0 }
+    }
+
+    /// `(a, 1/b, k)` of a law.
+    fn coefficients(&self, s: &Sym2) -> (f64, f64, f64) {
+        let bilinear = |x: &[f64; 2], y: &[f64; 2]| {
+            s.a * x[0] * y[0] + s.b * x[1] * y[1] + s.c * (x[0] * y[1] + x[1] * y[0])
+        };
+        let (ee, eg, gg) =
+            (bilinear(&self.e, &self.e), bilinear(&self.e, &self.g), bilinear(&self.g, &self.g));
+        (ee - eg * eg / gg, 1.0 / gg, eg / gg)
+    }
+
+    /// A rate `x (D_xx - D_yy) + y (2 D_xy) + z tr D` of the nodal velocities.
+    fn row(s: &PointShape, [x, y]: [f64; 2], z: f64) -> Row {
+        let mut row = [0.0; N];
+        for a in 0..NODES {
+            row[a] = (z + x) * s.gx[a] + y * s.gy[a];
+            row[NODES + a] = (z - x) * s.gy[a] + y * s.gx[a];
+        }
+        row
+    }
+
+    fn stretch(&self, s: &PointShape) -> Row {
+        Frame::row(s, self.e, -self.lack)
+    }
+
+    fn shear(&self, s: &PointShape) -> Row {
+        Frame::row(s, self.g, 0.0)
+    }
+
+    /// `t.x`, in half cells.
+    fn along(&self, r: [f64; 2], [hx, hy]: [f64; 2]) -> f64 {
+        (self.t[0] * r[0] * hx + self.t[1] * r[1] * hy) / (hx * hy).sqrt()
+    }
+}
+
+/// Means of the laws over the cell.
+#[derive(Default)]
+struct Means {
+    a: f64,
+    a_inverse: f64,
+    b: f64,
+    b_inverse: f64,
+    k: f64,
+    dilation_share: f64,
+    dilation_inverse: f64,
+}
+
+impl Means {
+    /// `beta_h`, and whether both sides are incompressible.
+    fn dilation(&self) -> (f64, bool) {
+        if self.dilation_share == 0.0 {
+            return (0.0, false);
+        }
+        let mean = self.dilation_share * self.dilation_share / self.dilation_inverse;
+        (mean, self.dilation_share > 1.0 - 1e-9)
+    }
+}
+
+/// The mixed coefficients `(a, 1/b, k)` at every point, and their means.
+fn coefficients(cut: &Cut, frame: &Frame) -> ([[f64; 3]; SUBPOINTS], Means) {
+    let mut at = [[0.0; 3]; SUBPOINTS];
+    let mut means = Means::default();
+    for (q, (at, g)) in at.iter_mut().zip(GAUSS_6X6.iter()).enumerate() {
+        let share = cut.interface.share[q];
+        for (side, phi) in cut.sides.iter().zip([1.0 - share, share]) {
+            if phi == 0.0 {
+                continue;
+            }
+            let law = &side[q];
+            let (a, b_inverse, k) = frame.coefficients(&law.shear);
+            for (sum, v) in at.iter_mut().zip([a, b_inverse, k]) {
+                *sum += phi * v;
+            }
+            let w = g.weight * phi;
+            means.a += w * a;
+            means.a_inverse += w / a;
+            means.b += w / b_inverse;
+            means.b_inverse += w * b_inverse;
+            means.k += w * k;
+            if law.dilation > 0.0 {
+                means.dilation_share += w;
+                means.dilation_inverse += w / law.dilation;
+            }
+        }
+    }
+    (at, means)
+}
+
+/// Stiffness of a cut cell.
+pub fn matrix(cut: &Cut) -> VelocityMatrix {
+    let mut frame = Frame::new(cut.interface.normal);
+    let (at, means) = coefficients(cut, &frame);
+    let (a_h, b_h) = (1.0 / means.a_inverse, 1.0 / means.b_inverse);
+    let r = (a_h / means.a).min(b_h / means.b).min(1.0);
+    let (dilation, incompressible) = means.dilation();
+    let mut stiffening = 1.0;
+    if incompressible {
+        frame.lack = 1.0 - r * r;
+        stiffening = DILATION + (1.0 - DILATION) * r;
+    }
+    let loose = LOOSE + (1.0 - LOOSE) * r;
+
+    // Integrals over the two sides.
+    let area = cut.size[0] * cut.size[1];
+    let mut compliance = [[0.0; 3]; 3];
+    let mut tension = [[0.0; 2]; 2];
+    let mut stretch = [[0.0; N]; 2];
+    let mut shear = [[0.0; N]; 3];
+    for (g, [a, b_inverse, k]) in GAUSS_6X6.iter().zip(at) {
+        let s = PointShape::new(&g.shape, cut.size);
+        let e = frame.stretch(&s);
+        let v = [1.0, g.r[0], g.r[1]];
+        let u = [1.0, frame.along(g.r, cut.size)];
+        for i in 0..3 {
+            for j in 0..=i {
+                compliance[i][j] += g.weight * b_inverse * v[i] * v[j];
+            }
+            if k != 0.0 {
+                add_row(&mut shear[i], g.weight * k * v[i], &e);
+            }
+        }
+        for i in 0..2 {
+            for j in 0..=i {
+                tension[i][j] += g.weight * a * u[i] * u[j];
+            }
+            add_row(&mut stretch[i], g.weight * a * u[i], &e);
+        }
+    }
+    // Of the whole cell: the 3 x 3 rule is exact.
+    let mut fitted = [[0.0; N]; 3];
+    let shape = GAUSS_3X3.each_ref().map(|g| PointShape::new(&g.shape, cut.size));
+    let sheared = shape.each_ref().map(|s| {
+        let mut row = frame.shear(s);
+        add_row(&mut row, means.k, &frame.stretch(s));
+        row
+    });
+    for ((g, s), row) in GAUSS_3X3.iter().zip(&shape).zip(&sheared) {
+        let along = frame.shear(s);
+        for (i, v) in [1.0, g.r[0], g.r[1]].into_iter().enumerate() {
+            add_row(&mut shear[i], g.weight * v, &along);
+            let mass = if i == 0 { 1.0 } else { 1.0 / 3.0 };
+            add_row(&mut fitted[i], g.weight * v / mass, row);
+        }
+    }
+
+    let mut k = [[0.0; N]; N];
+    lower_solve(&mut compliance, &mut shear);
+    shear.iter().for_each(|row| add_square(&mut k, area, row));
+    lower_solve(&mut tension, &mut stretch);
+    stretch.iter().for_each(|row| add_square(&mut k, area, row));
+    upper_solve(&tension, &mut stretch);
+    for ((g, s), mut row) in GAUSS_3X3.iter().zip(&shape).zip(sheared) {
+        let w = area * g.weight;
+        for (fit, v) in fitted.iter().zip([1.0, g.r[0], g.r[1]]) {
+            add_row(&mut row, -v, fit);
+        }
+        add_square(&mut k, w * loose * b_h, &row);
+        let mut row = frame.stretch(s);
+        add_row(&mut row, -1.0, &stretch[0]);
+        add_row(&mut row, -frame.along(g.r, cut.size), &stretch[1]);
+        add_square(&mut k, w * loose * a_h, &row);
+        add_square(&mut k, w * stiffening * dilation, &Frame::row(s, [0.0; 2], 1.0));
+    }
+    for i in 0..N {
+        for j in 0..i {
+            k[j][i] = k[i][j];
+        }
+    }
+    k
+}
+
+#[inline(always)]
+fn add_row(sum: &mut Row, f: f64, row: &Row) {
+    for (s, v) in sum.iter_mut().zip(row) {
+        *s += f * v;
+    }
+}
+
+/// `k += w row^T row`, of which only the lower triangle will be read.
+#[inline(always)]
+fn add_square(k: &mut VelocityMatrix, w: f64, row: &Row) {
+    for (line, r) in k.iter_mut().zip(row) {
+        add_row(line, w * r, row);
+    }
+}
+
+/// Replaces the lower triangle of a small positive definite matrix by its Cholesky factor, and
+/// the rows by `L^-1 rows`. A pivot that rounding ate is replaced by one that rounding cannot.
+fn lower_solve<const R: usize>(m: &mut [[f64; R]; R], rows: &mut [Row; R]) {
+    for i in 0..R {
+        for j in 0..=i {
+            let s: f64 = m[i][j] - (0..j).map(|q| m[i][q] * m[j][q]).sum::<f64>();
+            m[i][j] = if i == j { s.max(1e-14 * m[i][i]).sqrt() } else { s / m[j][j] };
+        }
+        for j in 0..i {
+            let (before, after) = rows.split_at_mut(i);
+            add_row(&mut after[0], -m[i][j], &before[j]);
+        }
+        rows[i].iter_mut().for_each(|v| *v /= m[i][i]);
+    }
+}
+
+/// `L^-T rows`
+fn upper_solve<const R: usize>(l: &[[f64; R]; R], rows: &mut [Row; R]) {
+    for i in (0..R).rev() {
+        for j in i + 1..R {
+            let (before, after) = rows.split_at_mut(j);
+            add_row(&mut before[i], -l[j][i], &after[0]);
+        }
+        rows[i].iter_mut().for_each(|v| *v /= l[i][i]);
+    }
+}
