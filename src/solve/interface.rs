@@ -178,3 +178,72 @@ fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
     let normal = [angle.cos(), angle.sin()];
     Interface { share, normal, trust: directed * fade((held - wanted).abs(), MISFIT) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Placement;
+    use crate::space::mesh::Axis;
+    use crate::space::seeding::Seeding;
+
+    const CENTRE: usize = 4;
+
+    /// Jittered particles on 3 x 3 unit cells, labelled by a function of the distance from the
+    /// centre; the interface in the central cell and its true area there.
+    fn find(seed: u64, second: impl Fn([f64; 2]) -> bool) -> (Interface, f64) {
+        let axis = || Axis::new(vec![0.0, 1.0, 2.0, 3.0], false);
+        let mesh = Mesh::new(axis(), axis());
+        let seeding = Seeding { side: 4, placement: Placement::Jittered, seed };
+        let mut particles = Particles::default();
+        for cell in 0..mesh.cells() {
+            for p in seeding.positions(&mesh, cell, &mut seeding.random(cell)) {
+                particles.position.push(p);
+                particles.volume.push(1.0);
+                particles.material.push(u8::from(second([p[0] - 1.5, p[1] - 1.5])));
+            }
+        }
+        particles.sort(&mesh);
+        let held = particles.of_cell(CENTRE).filter(|&p| particles.material[p] == 1).count();
+        let fine = (0..10_000)
+            .filter(|k| second([(k % 100) as f64 / 100.0 - 0.495, (k / 100) as f64 / 100.0 - 0.495]))
+            .count();
+        let found = Surroundings::default().interface(
+            &mesh,
+            &particles,
+            CENTRE,
+            [0, 1],
+            held as f64 / 16.0,
+        );
+        (found.unwrap(), fine as f64 / 1e4)
+    }
+
+    fn area(i: &Interface) -> f64 {
+        GAUSS_6X6.iter().zip(i.share).map(|(g, s)| g.weight * s).sum()
+    }
+
+    #[test]
+    fn an_edge_is_found() {
+        let mut sum = 0.0;
+        for seed in 0..50 {
+            let angle = seed as f64;
+            let n = [angle.cos(), angle.sin()];
+            let offset = 0.3 * (2.3 * angle).sin();
+            let (found, truth) = find(seed, |p| n[0] * p[0] + n[1] * p[1] > offset);
+            assert!(found.trust > 0.5, "{}", found.trust);
+            let sine = found.normal[0] * n[1] - found.normal[1] * n[0];
+            assert!(sine.abs() < 0.15, "{sine}");
+            sum += (area(&found) - truth).powi(2);
+        }
+        assert!((sum / 50.0).sqrt() < 0.03);
+    }
+
+    #[test]
+    fn a_sheet_has_a_direction_and_a_drop_has_none() {
+        let (sheet, truth) = find(3, |p| (0.6 * p[0] + 0.8 * p[1]).abs() < 0.25);
+        assert!((area(&sheet) - truth).abs() < 0.12);
+        let sine = sheet.normal[0] * 0.8 - sheet.normal[1] * 0.6;
+        assert!(sheet.trust > 0.5 && sine.abs() < 0.15, "{sheet:?}");
+        let (drop, _) = find(3, |p| p[0].hypot(p[1]) < 0.35);
+        assert!(drop.trust < 0.5, "{}", drop.trust);
+    }
+}
