@@ -217,7 +217,13 @@ impl Plan {
             !plain,
             why(
                 !plain,
-                "accuracy.quadrature = \"mixture\"".into(),
+                match self.method.quadrature {
+                    Quadrature::Laminate => {
+                        "accuracy.quadrature = \"laminate\": the rest of cut cells"
+                    }
+                    _ => "accuracy.quadrature = \"mixture\"",
+                }
+                .into(),
                 "accuracy.quadrature = \"particles\"",
             ),
             0,

@@ -23,7 +23,7 @@ use nalgebra::{SMatrix, SVector};
 const RIDGE: f64 = 2e-3;
 const NEWTON_STEPS: usize = 6;
 /// Where the regression is surer of a particle than this it stops looking at it.
-const CERTAIN: f64 = 14.0;
+const CERTAIN: f64 = 9.0;
 /// Width of the ramp from one material to the other, in cells: the spacing of the points.
 const RAMP: f64 = 1.0 / 6.0;
 /// Points within this distance (cells) of the interface have a say in its direction.
@@ -45,16 +45,22 @@ pub struct Interface {
     pub trust: f64,
 }
 
-type Coefficients = SVector<f64, 6>;
+/// `a, g_x, g_y, H_xx, H_xy, H_yy`
+type Coefficients = [f64; 6];
 
-fn basis([x, y]: [f64; 2]) -> Coefficients {
-    Coefficients::new(1.0, x, y, 0.5 * x * x, x * y, 0.5 * y * y)
+fn basis([x, y]: [f64; 2]) -> [f64; 6] {
+    [1.0, x, y, 0.5 * x * x, x * y, 0.5 * y * y]
+}
+
+#[inline(always)]
+fn value(f: &[f64; 6], x: &[f64; 6]) -> f64 {
+    f.iter().zip(x).map(|(f, x)| f * x).sum()
 }
 
 /// Room for the particles around a cell, kept from cell to cell.
 #[derive(Default)]
 pub struct Surroundings {
-    particles: Vec<([f64; 2], bool)>,
+    particles: Vec<([f64; 6], bool)>,
 }
 
 impl Surroundings {
@@ -103,45 +109,40 @@ impl Surroundings {
                 }
                 let [x, y] = particles.position[p];
                 let at = [nearest(x - cx, lx) / hx, nearest(y - cy, ly) / hy];
-                self.particles.push((at, m == b));
+                self.particles.push((basis(at), m == b));
             }
         }
     }
 
     /// Newton's method; starts from nothing, where its first step is linear least squares.
     fn regress(&self) -> Option<Coefficients> {
-        let mut f = Coefficients::zeros();
+        let mut f: Coefficients = [0.0; 6];
         for _ in 0..NEWTON_STEPS {
-            let mut gradient = -RIDGE * f;
+            let mut gradient: Coefficients = f.map(|f| -RIDGE * f);
             gradient[0] = 0.0;
-            let mut hessian = [0.0; 21];
-            for (at, second) in &self.particles {
-                let x = basis(*at);
-                let value = f.dot(&x);
+            let mut hessian = [[0.0; 6]; 6];
+            for (x, second) in &self.particles {
+                let value = value(&f, x);
                 if value.abs() > CERTAIN && (value > 0.0) == *second {
                     continue;
                 }
                 let p = 1.0 / (1.0 + (-value.clamp(-30.0, 30.0)).exp());
                 let miss = if *second { 1.0 - p } else { -p };
                 let weight = p * (1.0 - p);
-                let mut k = 0;
                 for i in 0..6 {
                     gradient[i] += miss * x[i];
                     let w = weight * x[i];
-                    for j in 0..=i {
-                        hessian[k] += w * x[j];
-                        k += 1;
+                    for j in 0..6 {
+                        hessian[i][j] += w * x[j];
                     }
                 }
             }
-            let mut matrix = SMatrix::<f64, 6, 6>::from_fn(|i, j| {
-                let (i, j) = (i.max(j), i.min(j));
-                hessian[i * (i + 1) / 2 + j]
-            });
-            for i in 0..6 {
-                matrix[(i, i)] += if i == 0 { 1e-6 } else { RIDGE };
+            for (i, row) in hessian.iter_mut().enumerate() {
+                row[i] += if i == 0 { 1e-6 } else { RIDGE };
             }
-            f += matrix.cholesky()?.solve(&gradient);
+            let matrix = SMatrix::<f64, 6, 6>::from_fn(|i, j| hessian[i][j]);
+            let step = matrix.cholesky()?.solve(&SVector::from(gradient));
+            f.iter_mut().zip(step.iter()).for_each(|(f, s)| *f += s);
         }
         f.iter().all(|v| v.is_finite()).then_some(f)
     }
@@ -161,7 +162,7 @@ fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
         let gx = f[1] + f[3] * at[0] + f[4] * at[1];
         let gy = f[2] + f[4] * at[0] + f[5] * at[1];
         let slope = (gx * gx + gy * gy).sqrt().max(1e-30);
-        let distance = f.dot(&basis(at)) / slope;
+        let distance = value(f, &basis(at)) / slope;
         *share = (0.5 + distance / RAMP).clamp(0.0, 1.0);
         held += g.weight * *share;
         // Directions are those of the world, not of a stretched cell.
@@ -177,4 +178,75 @@ fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
     let directed = 1.0 - fade(coherence, COHERENCE);
     let normal = [angle.cos(), angle.sin()];
     Interface { share, normal, trust: directed * fade((held - wanted).abs(), MISFIT) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Placement;
+    use crate::space::mesh::Axis;
+    use crate::space::seeding::Seeding;
+
+    const CENTRE: usize = 4;
+
+    /// Jittered particles on 3 x 3 unit cells, labelled by a function of the distance from the
+    /// centre; the interface in the central cell and its true area there.
+    fn find(seed: u64, second: impl Fn([f64; 2]) -> bool) -> (Interface, f64) {
+        let axis = || Axis::new(vec![0.0, 1.0, 2.0, 3.0], false);
+        let mesh = Mesh::new(axis(), axis());
+        let seeding = Seeding { side: 4, placement: Placement::Jittered, seed };
+        let mut particles = Particles::default();
+        for cell in 0..mesh.cells() {
+            for p in seeding.positions(&mesh, cell, &mut seeding.random(cell)) {
+                particles.position.push(p);
+                particles.volume.push(1.0);
+                particles.material.push(u8::from(second([p[0] - 1.5, p[1] - 1.5])));
+            }
+        }
+        particles.sort(&mesh);
+        let held = particles.of_cell(CENTRE).filter(|&p| particles.material[p] == 1).count();
+        let fine = (0..10_000)
+            .filter(|k| {
+                second([(k % 100) as f64 / 100.0 - 0.495, (k / 100) as f64 / 100.0 - 0.495])
+            })
+            .count();
+        let found = Surroundings::default().interface(
+            &mesh,
+            &particles,
+            CENTRE,
+            [0, 1],
+            held as f64 / 16.0,
+        );
+        (found.unwrap(), fine as f64 / 1e4)
+    }
+
+    fn area(i: &Interface) -> f64 {
+        GAUSS_6X6.iter().zip(i.share).map(|(g, s)| g.weight * s).sum()
+    }
+
+    #[test]
+    fn an_edge_is_found() {
+        let mut sum = 0.0;
+        for seed in 0..50 {
+            let angle = seed as f64;
+            let n = [angle.cos(), angle.sin()];
+            let offset = 0.3 * (2.3 * angle).sin();
+            let (found, truth) = find(seed, |p| n[0] * p[0] + n[1] * p[1] > offset);
+            assert!(found.trust > 0.5, "{}", found.trust);
+            let sine = found.normal[0] * n[1] - found.normal[1] * n[0];
+            assert!(sine.abs() < 0.15, "{sine}");
+            sum += (area(&found) - truth).powi(2);
+        }
+        assert!((sum / 50.0).sqrt() < 0.03);
+    }
+
+    #[test]
+    fn a_sheet_has_a_direction_and_a_drop_has_none() {
+        let (sheet, truth) = find(3, |p| (0.6 * p[0] + 0.8 * p[1]).abs() < 0.25);
+        assert!((area(&sheet) - truth).abs() < 0.12);
+        let sine = sheet.normal[0] * 0.8 - sheet.normal[1] * 0.6;
+        assert!(sheet.trust > 0.5 && sine.abs() < 0.15, "{sheet:?}");
+        let (drop, _) = find(3, |p| p[0].hypot(p[1]) < 0.35);
+        assert!(drop.trust < 0.5, "{}", drop.trust);
+    }
 }
