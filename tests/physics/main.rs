@@ -4,6 +4,7 @@ mod alignment;
 mod dynamics;
 mod exact;
 mod laws;
+mod order;
 mod patch;
 
 use grainscope::plan::resolve;
