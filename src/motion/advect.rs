@@ -23,10 +23,9 @@ pub fn advance(
         if members.is_empty() {
             continue;
         }
-        let home = carrier.home(cell);
         for p in members {
             let from = particles.position[p];
-            let journey = carrier.travel(&home, from);
+            let journey = carrier.travel(cell, from);
             count.held += u64::from(journey.held);
             let material = particles.material[p];
             let volume = particles.volume[p];

@@ -2,5 +2,6 @@
 
 pub mod advect;
 pub mod carrier;
+pub mod current;
 pub mod gauges;
 pub mod tracers;

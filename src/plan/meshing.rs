@@ -67,9 +67,23 @@ impl Sizing {
                     size: (b.at - a.at) / cells,
                 });
             }
-            self.fill(a.at, b.at, (cells - 1e-6).ceil().max(1.0) as usize, &mut lines);
+            let mut n = (cells - 1e-6).ceil().max(1.0) as usize;
+            if self.is_gap(a.at, b.at, span) {
+                n += n % 2;
+            }
+            self.fill(a.at, b.at, n, &mut lines);
         }
         Ok(lines)
+    }
+
+    /// From lip to lip. An even number of cells puts a line in the middle of the gap: in a column
+    /// of cells across the axis of a symmetric jet, splits and merges of particles know no
+    /// symmetry, and the jet of the silo leant over by 0.8 apertures at 0.6 ms.
+    fn is_gap(&self, a: f64, b: f64, span: f64) -> bool {
+        let refined = |x: f64| {
+            self.refinements.iter().any(|r| r.factor > 1.0 && (r.at - x).abs() <= 1e-9 * span)
+        };
+        refined(a) && refined(b)
     }
 
     fn is_uniform_between(&self, a: f64, b: f64) -> bool {
@@ -151,6 +165,16 @@ mod tests {
         let n = lines.len();
         for i in 0..n {
             assert!((lines[i] + lines[n - 1 - i] - 2.0).abs() < 1e-12, "not symmetric");
+        }
+    }
+
+    #[test]
+    fn a_gap_between_lips_has_a_line_in_its_middle() {
+        let lip = |at| Refinement { at, factor: 3.0 };
+        for size in [0.1, 0.15, 0.2, 0.3] {
+            let s = Sizing { size, refinements: vec![lip(-0.5), lip(0.5)], growth: 1.6 };
+            let lines = s.lines(vec![line(-2.0), line(-0.5), line(0.5), line(2.0)]).unwrap();
+            assert!(lines.iter().any(|x| x.abs() < 1e-12), "{lines:?}");
         }
     }
 

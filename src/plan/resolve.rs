@@ -743,11 +743,19 @@ impl Walls {
         Ok(Walls { walls, blocks })
     }
 
-    /// Ends of walls that stop inside the domain and on no other wall: the lips of apertures.
-    fn tips(&self, [x, y]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
+    /// The lips of apertures: ends of walls that face each other across a gap. (Grading towards
+    /// the upper ends of the silo's side walls too takes 1.6 times the cells and changes the
+    /// initial discharge by 1e-5.)
+    fn lips(&self, domain: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
+        let tips = self.tips(domain);
+        tips.iter().filter(|t| tips.iter().any(|o| t.faces(o))).map(|t| t.at).collect()
+    }
+
+    /// Ends of walls that stop inside the domain and on no other wall.
+    fn tips(&self, [x, y]: [[f64; 2]; 2]) -> Vec<Tip> {
         let mut tips = Vec::new();
         for (k, w) in self.walls.iter().enumerate() {
-            for end in w.along {
+            for (end, up) in w.along.into_iter().zip([false, true]) {
                 let p = if w.normal == 0 { [w.at, end] } else { [end, w.at] };
                 let tiny = 1e-9 * (x[1] - x[0]).max(y[1] - y[0]);
                 let inside = p[0] > x[0] + tiny
@@ -761,7 +769,7 @@ impl Walls {
                         && p[1 - o.normal] <= o.along[1] + tiny
                 });
                 if inside && !on_other {
-                    tips.push(p);
+                    tips.push(Tip { at: p, normal: w.normal, up });
                 }
             }
         }
@@ -898,7 +906,7 @@ fn mesh(
     if !(growth > 1.0 && growth <= 2.0) {
         return Err(SceneError::new(
             format!("mesh.growth is {growth}"),
-            "neighbouring cells may differ by a ratio above 1, at most 2; 1.25 is usual",
+            "neighbouring cells may differ by a ratio above 1, at most 2; 1.5 is usual",
         ));
     }
     let mut lines: [Vec<Line>; 2] = [vec![], vec![]];
@@ -971,7 +979,9 @@ fn mesh(
         if out.len() - 1 > MAX_CELLS {
             return Err(SceneError::new(
                 format!("the mesh would have {} cells along {}", out.len() - 1, ["x", "y"][c]),
-                format!("lower accuracy.cells or the grading factors; at most {MAX_CELLS}"),
+                format!(
+                    "lower accuracy.cells or the grading (mesh.grading = [] for none); at most {MAX_CELLS}"
+                ),
             ));
         }
         // A periodic axis needs two cells, or a node would be its own neighbour.
@@ -990,7 +1000,8 @@ fn mesh(
         return Err(SceneError::new(
             format!("the mesh would have {} x {} cells", x.cells(), y.cells()),
             format!(
-                "lower accuracy.cells or the grading: at most {MAX_TOTAL_CELLS} cells fit into memory"
+                "lower accuracy.cells or the grading (mesh.grading = [] for none): at most \
+                 {MAX_TOTAL_CELLS} cells fit into memory"
             ),
         ));
     }
@@ -1006,6 +1017,36 @@ fn mesh(
     Ok(mesh)
 }
 
+/// By how much cells shrink towards the lips of apertures unless the scene says otherwise.
+///
+/// The flow there goes as the square root of the distance, so the error of the discharge is of the
+/// size of the lip's cells. Initial discharge of the silo at 6 cells per aperture, over its limit,
+/// for alpha = 0 and 1/3: 0.9817, 0.9773 uniform, 0.9975, 0.9968 with 8, 0.9985 (alpha = 0) with
+/// 16, where the particles of the cells around are larger than a cell at the lip and its filling
+/// becomes noise. With 12 both are within 0.3 %.
+const LIP_FACTOR: f64 = 12.0;
+
+/// A free end of a wall.
+struct Tip {
+    at: [f64; 2],
+    /// Of its wall.
+    normal: usize,
+    /// It is the upper or right end.
+    up: bool,
+}
+
+impl Tip {
+    /// The two are on one line and point at each other.
+    fn faces(&self, o: &Tip) -> bool {
+        let (n, t) = (self.normal, 1 - self.normal);
+        let distance = o.at[t] - self.at[t];
+        n == o.normal
+            && (o.at[n] - self.at[n]).abs() <= 1e-9 * distance.abs()
+            && self.up != o.up
+            && self.up == (distance > 0.0)
+    }
+}
+
 fn refinements(
     scene: &Scene,
     scope: &Scope,
@@ -1013,7 +1054,15 @@ fn refinements(
     walls: &Walls,
 ) -> Result<[Vec<Refinement>; 2]> {
     let mut out = [vec![], vec![]];
-    for g in &scene.mesh.grading {
+    let Some(grading) = &scene.mesh.grading else {
+        for lip in walls.lips(domain) {
+            for c in 0..2 {
+                out[c].push(Refinement { at: lip[c], factor: LIP_FACTOR });
+            }
+        }
+        return Ok(out);
+    };
+    for g in grading {
         let factor = g.factor.eval(scope)?;
         if !(1.0..=1000.0).contains(&factor) {
             return Err(SceneError::at(
@@ -1024,7 +1073,9 @@ fn refinements(
         }
         match &g.towards {
             GradingTarget::Apertures => {
-                for tip in walls.tips(domain) {
+                let lips = walls.lips(domain);
+                let ends = || walls.tips(domain).iter().map(|t| t.at).collect();
+                for tip in if lips.is_empty() { ends() } else { lips } {
                     for c in 0..2 {
                         out[c].push(Refinement { at: tip[c], factor });
                     }

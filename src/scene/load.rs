@@ -344,8 +344,8 @@ mod tests {
         [0, -10] | [0] | [0] | invalid length 1 in `gravity` | an array of length 2
         [0, -10] | [0, 1, 2] | [0 | a list of 3 values | expected 2 values
         ["-aperture/2" | [1, "-aperture/2" | [ | a list of 3 values | expected 2 values
-        cells = 8 | cells = -8 | -8 | integer `-8` | a whole number, 0 or more
-        cells = 8 | cells = 1.5 | 1.5 | floating point `1.5` | a whole number
+        cells = 6 | cells = -8 | -8 | integer `-8` | a whole number, 0 or more
+        cells = 6 | cells = 1.5 | 1.5 | floating point `1.5` | a whole number
         shape.rectangle.x | shape.circle.x | shape | a choice is needed | exactly one
         shape.rectangle.x | shape.rectangle.z | z | unknown key `z` | `x`, `y`
         schema = 1 | schema = 2 | 2 | schema 2 is not known | reads `schema = 1`
@@ -354,7 +354,7 @@ mod tests {
         gravity | schema = 1\ngravity | schema | duplicate key | remove one
         [time] | [time | no place | not TOML | TOML syntax
         parameters.coupling | parameters.alpha | alpha | duplicate key | remove one
-        cells = 8 | cells = many | many | must be quoted | in quotes
+        cells = 6 | cells = many | many | must be quoted | in quotes
         "1/3" | "1/zz" | zz | unknown name `zz` | known names are
         "1/3" | "1/0" | "1/0" | not finite: it is inf | division by zero
         "1/3" | 101 | 101 | `alpha` is 101, outside its range: 0 to 100 | choose
@@ -384,7 +384,7 @@ mod tests {
     fn reports_several_errors_at_once() {
         let text = with(&[
             ("density = 1e6", "dnsity = 1e6"),
-            ("factor = 2", "faktor = 2"),
+            ("cells = 6", "cels = 6"),
             ("spacing", "spacng"),
             ("[time]", "[time]\nqqq = 1"),
             ("\"down\"", "\"dwn\""),
@@ -414,9 +414,8 @@ mod tests {
             [materials.granular]\ncolour = \"#112233\"
             granular = { porosity = 0.5, coordination = 4, normal_dashpot = 1, tangential_dashpot = 1 }
         ";
-        let grading = ("grading = [{ towards = \"apertures\", factor = 2 }]", "");
         let lines_of_dye = ("[dye.grid]", "[dye]\nlines = [[[0, 1], [1, \"1\"]]]\n[dye.grid]");
-        let text = with(&[grading, lines_of_dye]) + more;
+        let text = with(&[lines_of_dye]) + more;
         let scene =
             parse(&SceneSource::new("s.toml", text)).unwrap_or_else(|e| panic!("{:?}", e.lines()));
         let written = to_toml(&scene);
@@ -518,7 +517,7 @@ mod tests {
         for _ in 0..600 {
             let mut text: Vec<char> = silo().text().chars().collect();
             for _ in 0..=random(6) {
-                let at = random(text.len());
+                let at = random(text.len().max(1));
                 match random(3) {
                     0 => _ = text.drain(at..(at + random(40)).min(text.len())),
                     1 => text.splice(at..at, pieces[random(pieces.len())].chars()).for_each(drop),

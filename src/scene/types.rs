@@ -93,9 +93,10 @@ pub struct Domain {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
-    /// Places where cells are made smaller.
-    #[serde(default)]
-    pub grading: Vec<Grading>,
+    /// Places where cells are made smaller. Absent: towards ends of walls that face each other
+    /// across a gap, by a factor of 12; `[]`: nowhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grading: Option<Vec<Grading>>,
     /// Largest ratio of neighbouring cells in graded parts.
     #[serde(default = "growth_default")]
     pub growth: f64,
@@ -117,7 +118,7 @@ pub struct Grading {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GradingTarget {
-    /// The free ends of inner walls.
+    /// The ends of inner walls that face each other across a gap; where none do, all free ends.
     Apertures,
     /// All no-slip boundaries and those with a given rotation.
     Walls,
@@ -384,7 +385,8 @@ pub struct Time {
     /// Largest step, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_step: Option<Quantity>,
-    /// Largest number of cells a particle crosses in a step.
+    /// Largest number of cells a particle crosses in a step; cells that grading made smaller count
+    /// less.
     #[serde(default = "courant_default")]
     pub courant: f64,
     /// Largest strain in a step.
@@ -497,7 +499,7 @@ pub struct Change {
 
 impl Default for Mesh {
     fn default() -> Self {
-        Mesh { grading: vec![], growth: growth_default(), lines_x: vec![], lines_y: vec![] }
+        Mesh { grading: None, growth: growth_default(), lines_x: vec![], lines_y: vec![] }
     }
 }
 
@@ -535,8 +537,10 @@ fn zero_pair() -> [Quantity; 2] {
 fn zero_field() -> Field {
     Field::number(0.0)
 }
+/// On the silo, lips graded by 8, 1.6 takes a fifth fewer cells than 1.3 and changes the initial
+/// discharge by 0.03 %.
 fn growth_default() -> f64 {
-    1.25
+    1.5
 }
 fn courant_default() -> f64 {
     0.5

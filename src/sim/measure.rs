@@ -14,6 +14,12 @@ use std::time::Instant;
 /// Powers below this share of what the loads could have are rounding: the scene is at rest.
 const REST: f64 = 1e-6;
 
+/// A particle may cross this many cells that grading made small for one usual cell: their rows
+/// reach across the domain and know nothing of the flow far from what they are for. On the silo,
+/// lips graded by 8, outflow at 0.7 ms was 4.077 in steps of four small cells (half a usual one)
+/// and 4.078 in steps of two, which are half as many again.
+const GRADED_ALLOWANCE: f64 = 8.0;
+
 /// The row before anything is known.
 pub fn empty_row(plan: &Plan) -> Row {
     Row {
@@ -83,11 +89,17 @@ impl<const D: usize> Simulation<D> {
         let layered: Vec<bool> =
             self.matter.materials.iter().map(|m| m.layer_viscosity.is_some()).collect();
         let mut speeds = Speeds { crossings: 0.0, strain_rate: 0.0 };
+        let usual = [&mesh.x, &mesh.y]
+            .map(|axis| (0..axis.cells()).map(|k| axis.size(k)).fold(0.0, f64::max));
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
             let [hx, hy] = mesh.cell_size(cell);
             let nodal = self.flow.of_cell(mesh, cell);
+            let counted = [hx, hy].map(|h| h * GRADED_ALLOWANCE);
             for u in &nodal {
-                speeds.crossings = speeds.crossings.max(u[0].abs() / hx).max(u[1].abs() / hy);
+                for c in 0..2 {
+                    let size = counted[c].min(usual[c]);
+                    speeds.crossings = speeds.crossings.max(u[c].abs() / size);
+                }
             }
             if self.plan.effects.directors
                 && (0..layered.len()).any(|m| layered[m] && self.quadrature.fraction(cell, m) > 0.0)

@@ -233,7 +233,7 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let plan = self.plan.clone();
         let compliant = self.compliant();
-        let carrier = Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &half, dt };
+        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, &half, dt);
         advect::advance(
             &carrier,
             &mut self.particles,
@@ -318,8 +318,7 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let mut ahead = self.particles.clone();
         let compliant = self.compliant();
-        let carrier =
-            Carrier { mesh: &plan.mesh, enclosure: &plan.enclosure, velocity: &now, dt: 0.5 * dt };
+        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, &now, 0.5 * dt);
         let mut ignored = Count::default();
         advect::advance(&carrier, &mut ahead, &plan.effects, &compliant, &mut [], &mut ignored);
         ahead.sort(&plan.mesh);

@@ -5,6 +5,10 @@
 //! their centroid stays. An overfull cell merges its closest pairs of one material. Volume and
 //! centroid are kept material by material (so a level at rest stays there, and no potential energy
 //! is made); directors are averaged as axes.
+//!
+//! Of choices that are equal but for rounding, the one nearest to the middle of the domain is
+//! taken, so that mirror images decide alike. Otherwise a symmetric jet leans over: that of the
+//! silo, at 6 cells per aperture graded by 8, by a quarter of the aperture at 0.7 ms.
 
 use super::fit::{Degree, Fit, Polynomial};
 use super::mesh::Mesh;
@@ -104,12 +108,14 @@ impl Population {
         let places: Vec<[f64; 2]> =
             members.iter().map(|&p| mesh.to_reference(cell, particles.position[p])).collect();
         if self.target() >= 4 {
-            let mut quadrants = [0; 4];
-            for r in &places {
-                quadrants[usize::from(r[0] > 0.0) + 2 * usize::from(r[1] > 0.0)] += 1;
-            }
-            if let Some(q) = quadrants.iter().position(|&n| n == 0) {
-                return Some([(q % 2) as f64 - 0.5, (q / 2) as f64 - 0.5]);
+            let centres = (0..4).map(|q| [(q % 2) as f64 - 0.5, (q / 2) as f64 - 0.5]);
+            // A particle on the line between two quadrants is in both.
+            let holds = |c: &[f64; 2], r: &[f64; 2]| (0..2).all(|k| c[k] * r[k] > -SAME);
+            let empty = centres.filter(|c| !places.iter().any(|r| holds(c, r)));
+            let first =
+                cheapest(empty.map(|c| (0.0, from_middle(mesh, mesh.from_reference(cell, c)), c)));
+            if first.is_some() {
+                return first;
             }
         }
         if members.len() >= least {
@@ -122,16 +128,19 @@ impl Population {
                 .map(|r| (r[0] - g[0]).powi(2) + (r[1] - g[1]).powi(2))
                 .fold(f64::INFINITY, f64::min)
         };
-        lattice.max_by(|a, b| clearance(a).total_cmp(&clearance(b)))
+        cheapest(
+            lattice.map(|g| (-clearance(&g), from_middle(mesh, mesh.from_reference(cell, g)), g)),
+        )
     }
 
     /// Refills an empty cell with half of the largest particle of its neighbours.
     fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> bool {
-        let donor = self
-            .neighbours
-            .of(cell)
-            .flat_map(|n| particles.of_cell(n))
-            .max_by(|&a, &b| particles.volume[a].total_cmp(&particles.volume[b]));
+        let donor = cheapest(
+            self.neighbours
+                .of(cell)
+                .flat_map(|n| particles.of_cell(n))
+                .map(|p| (-particles.volume[p], from_middle(mesh, particles.position[p]), p)),
+        );
         let Some(donor) = donor else { return false };
         particles.volume[donor] *= 0.5;
         particles.duplicate(donor);
@@ -176,14 +185,10 @@ fn nearest(
         let r = mesh.to_reference(cell, particles.position[p]);
         (r[0] - place[0]).powi(2) + (r[1] - place[1]).powi(2)
     };
-    let by_volume =
-        |a: &&usize, b: &&usize| particles.volume[**a].total_cmp(&particles.volume[**b]);
-    members
-        .iter()
-        .filter(|&&p| particles.volume[p] >= least_volume)
-        .min_by(|&&a, &&b| distance(a).total_cmp(&distance(b)))
-        .or_else(|| members.iter().max_by(by_volume))
-        .copied()
+    let middle = |p: usize| from_middle(mesh, particles.position[p]);
+    let large = members.iter().copied().filter(|&p| particles.volume[p] >= least_volume);
+    cheapest(large.map(|p| (distance(p), middle(p), p)))
+        .or_else(|| cheapest(members.iter().map(|&p| (-particles.volume[p], middle(p), p))))
         .unwrap_or(members[0])
 }
 
@@ -249,6 +254,25 @@ impl CarriedFields {
     }
 }
 
+/// Differences below this are rounding: of reference coordinates, and of costs relative to them.
+const SAME: f64 = 1e-9;
+
+/// Squared distance from the middle of the domain: the same for mirror images.
+fn from_middle(mesh: &Mesh, p: [f64; 2]) -> f64 {
+    let x = p[0] - 0.5 * (mesh.x.start() + mesh.x.end());
+    let y = p[1] - 0.5 * (mesh.y.start() + mesh.y.end());
+    x * x + y * y
+}
+
+/// The choice of least cost among `(cost, from_middle, choice)`; of equal ones the innermost.
+fn cheapest<T>(choices: impl Iterator<Item = (f64, f64, T)>) -> Option<T> {
+    let better = |a: &(f64, f64, T), b: &(f64, f64, T)| {
+        let slack = SAME * b.0.abs();
+        a.0 < b.0 - slack || (a.0 <= b.0 + slack && a.1 < b.1)
+    };
+    choices.reduce(|best, next| if better(&next, &best) { next } else { best }).map(|c| c.2)
+}
+
 /// The two members of one kind that cost least to merge: close and small.
 fn closest_pair(
     mesh: &Mesh,
@@ -258,7 +282,7 @@ fn closest_pair(
 ) -> Option<(usize, usize)> {
     let [hx, hy] = mesh.cell_size(cell);
     let marked = |p: usize| particles.mark.as_ref().is_some_and(|m| m[p]);
-    let mut best = None;
+    let mut pairs = Vec::new();
     for (k, &a) in members.iter().enumerate() {
         for &b in &members[k + 1..] {
             if particles.material[a] != particles.material[b] || marked(a) != marked(b) {
@@ -268,12 +292,10 @@ fn closest_pair(
             let r2 = ((pa[0] - pb[0]) / hx).powi(2) + ((pa[1] - pb[1]) / hy).powi(2);
             let (va, vb) = (particles.volume[a], particles.volume[b]);
             let cost = r2 * va * vb / (va + vb);
-            if best.is_none_or(|(c, _)| cost < c) {
-                best = Some((cost, (a, b)));
-            }
+            pairs.push((cost, from_middle(mesh, pa) + from_middle(mesh, pb), (a, b)));
         }
     }
-    best.map(|(_, pair)| pair)
+    cheapest(pairs.into_iter())
 }
 
 impl Particles {

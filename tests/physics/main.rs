@@ -5,6 +5,7 @@ mod cases;
 mod dynamics;
 mod exact;
 mod laws;
+mod order;
 mod patch;
 mod rest;
 

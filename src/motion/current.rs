@@ -1,0 +1,215 @@
+//! The velocity that carries points: that of the solver, made divergence-free inside cells.
+//!
+//! The divergence of a Q2 velocity vanishes only in the mean against the pressures `1, xi, eta`
+//! of its cell. What is left of it would make particles clump, so each cell's velocity is
+//! corrected. With `U = u hy/2`, `V = v hx/2`, so that `div u = 4 (U,xi + V,eta) / (hx hy)`, and
+//! `U_ab` the coefficient of `xi^a eta^b`, the five terms of the divergence that the pressure
+//! does not see are
+//!
+//! ```text
+//! U_12 (eta^2 - 1/3) + V_21 (xi^2 - 1/3) + 2 (U_21 + V_12) xi eta
+//!     + 2 U_22 xi (eta^2 - 1/3) + 2 V_22 eta (xi^2 - 1/3)
+//! ```
+//! and the smallest correction (in L2, of degree three) that removes them and leaves the normal
+//! velocity on the cell's edges as it is:
+//!
+//! ```text
+//! U += V_21/3 (xi - xi^3) + S hy^2/(hx^2 + hy^2) eta (1 - xi^2)
+//!      - (1 - f)/3 U_22 (1 - xi^2)(1 - 3 eta^2) + 2 g/3 V_22 eta (xi - xi^3)
+//! S = U_21 + V_12    f = hx^2/(hx^2 + 5/21 hy^2)    g = hy^2/(hy^2 + 5/21 hx^2)
+//! ```
+//! and likewise `V` with the axes exchanged. The result is the curl of a bicubic stream function
+//! plus the divergence that the pressure sees (zero, or what a finite bulk viscosity lets be);
+//! smooth velocities keep their third order. The idea is that of Meyer and Jenny (2004) and of
+//! Wang, Agrusta and van Hunen (2015), who correct bilinear velocities.
+
+use crate::space::shape::NODES;
+use nalgebra::Matrix2;
+
+/// Coefficients of a polynomial, `[power across][power along]` the component's own direction.
+type Coefficients = [[f64; 4]; 3];
+
+/// Velocity in one cell, as polynomials of its reference coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct Current {
+    u: Coefficients,
+    v: Coefficients,
+}
+
+impl Current {
+    /// From the velocities at the nodes of a cell of size `[hx, hy]`.
+    pub fn new(nodal: &[[f64; 2]; NODES], [hx, hy]: [f64; 2]) -> Self {
+        let u = biquadratic(|along, across| nodal[3 * across + along][0] * 0.5 * hy);
+        let v = biquadratic(|along, across| nodal[3 * along + across][1] * 0.5 * hx);
+        let ratio = (hx / hy).powi(2);
+        Current {
+            u: scaled(&corrected(&u, &v, ratio), 2.0 / hy),
+            v: scaled(&corrected(&v, &u, 1.0 / ratio), 2.0 / hx),
+        }
+    }
+
+    pub fn at(&self, [xi, eta]: [f64; 2]) -> [f64; 2] {
+        [value(&self.u, xi, eta), value(&self.v, eta, xi)]
+    }
+
+    /// `L_ij = u_i,j` in a cell of size `[hx, hy]`.
+    pub fn gradient(&self, [xi, eta]: [f64; 2], [hx, hy]: [f64; 2]) -> Matrix2<f64> {
+        let [along_u, across_u] = slopes(&self.u, xi, eta);
+        let [along_v, across_v] = slopes(&self.v, eta, xi);
+        Matrix2::new(
+            along_u * 2.0 / hx,
+            across_u * 2.0 / hy,
+            across_v * 2.0 / hx,
+            along_v * 2.0 / hy,
+        )
+    }
+}
+
+/// Coefficients of the biquadratic with values `nodal(along, across)`, both 0, 1, 2.
+fn biquadratic(nodal: impl Fn(usize, usize) -> f64) -> Coefficients {
+    let quadratic =
+        |[low, middle, high]: [f64; 3]| [middle, 0.5 * (high - low), 0.5 * (high + low) - middle];
+    let rows: [[f64; 3]; 3] =
+        std::array::from_fn(|across| quadratic(std::array::from_fn(|along| nodal(along, across))));
+    let mut out = [[0.0; 4]; 3];
+    for a in 0..3 {
+        let column = quadratic([rows[0][a], rows[1][a], rows[2][a]]);
+        for b in 0..3 {
+            out[b][a] = column[b];
+        }
+    }
+    out
+}
+
+/// A component with its correction; `ratio`: (size along it / size across it)^2.
+fn corrected(own: &Coefficients, other: &Coefficients, ratio: f64) -> Coefficients {
+    const K: f64 = 5.0 / 21.0;
+    let mut c = *own;
+    let straight = other[2][1] / 3.0;
+    c[0][1] += straight;
+    c[0][3] -= straight;
+    let shear = (own[1][2] + other[1][2]) / (1.0 + ratio);
+    c[1][0] += shear;
+    c[1][2] -= shear;
+    let bow = own[2][2] / 3.0 * K / (ratio + K);
+    c[0][0] -= bow;
+    c[0][2] += bow;
+    c[2][0] += 3.0 * bow;
+    c[2][2] -= 3.0 * bow;
+    let twist = other[2][2] * 2.0 / 3.0 / (1.0 + K * ratio);
+    c[1][1] += twist;
+    c[1][3] -= twist;
+    c
+}
+
+fn scaled(c: &Coefficients, factor: f64) -> Coefficients {
+    c.map(|row| row.map(|v| v * factor))
+}
+
+fn row(c: &[f64; 4], s: f64) -> f64 {
+    c[0] + s * (c[1] + s * (c[2] + s * c[3]))
+}
+
+fn row_slope(c: &[f64; 4], s: f64) -> f64 {
+    c[1] + s * (2.0 * c[2] + s * 3.0 * c[3])
+}
+
+fn value(c: &Coefficients, along: f64, across: f64) -> f64 {
+    row(&c[0], along) + across * (row(&c[1], along) + across * row(&c[2], along))
+}
+
+/// Reference derivatives along and across.
+fn slopes(c: &Coefficients, along: f64, across: f64) -> [f64; 2] {
+    [
+        row_slope(&c[0], along)
+            + across * (row_slope(&c[1], along) + across * row_slope(&c[2], along)),
+        row(&c[1], along) + 2.0 * across * row(&c[2], along),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::flow::{gradient, interpolate};
+    use crate::space::shape::{GAUSS_3X3, Shape};
+
+    const SIZE: [f64; 2] = [0.3, 0.7];
+
+    /// Nodal values in a cell around `centre`.
+    fn sampled(f: impl Fn(f64, f64) -> [f64; 2], [x, y]: [f64; 2]) -> [[f64; 2]; NODES] {
+        std::array::from_fn(|k| {
+            let (i, j) = ((k % 3) as f64 - 1.0, (k / 3) as f64 - 1.0);
+            f(x + 0.5 * SIZE[0] * i, y + 0.5 * SIZE[1] * j)
+        })
+    }
+
+    fn arbitrary() -> [[f64; 2]; NODES] {
+        std::array::from_fn(|k| [(7.3 * k as f64 + 1.0).sin(), (3.9 * k as f64).cos()])
+    }
+
+    #[test]
+    fn the_divergence_left_is_what_the_pressure_sees() {
+        let nodal = arbitrary();
+        let current = Current::new(&nodal, SIZE);
+        let mut seen = [0.0; 3];
+        for g in GAUSS_3X3.iter() {
+            let div = gradient(&nodal, &g.shape, SIZE).trace();
+            for (s, (q, mass)) in
+                seen.iter_mut().zip([(1.0, 1.0), (g.r[0], 1.0 / 3.0), (g.r[1], 1.0 / 3.0)])
+            {
+                *s += g.weight * div * q / mass;
+            }
+        }
+        for r in [[0.0, 0.0], [0.3, -0.8], [-0.95, 0.4], [1.0, 1.0]] {
+            let expected = seen[0] + seen[1] * r[0] + seen[2] * r[1];
+            let div = current.gradient(r, SIZE).trace();
+            assert!((div - expected).abs() < 1e-13, "{r:?}: {div} {expected}");
+        }
+    }
+
+    #[test]
+    fn normal_velocities_on_edges_are_those_of_the_nodes() {
+        let nodal = arbitrary();
+        let current = Current::new(&nodal, SIZE);
+        for t in [-1.0, -0.6, 0.1, 0.8] {
+            for edge in [-1.0, 1.0] {
+                for (r, c) in [([edge, t], 0), ([t, edge], 1)] {
+                    let expected = interpolate(&nodal, &Shape::values(r))[c];
+                    assert!((current.at(r)[c] - expected).abs() < 1e-14);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_are_those_of_the_values() {
+        let current = Current::new(&arbitrary(), SIZE);
+        let (r, d) = ([0.37, -0.52], 1e-5);
+        let l = current.gradient(r, SIZE);
+        for c in 0..2 {
+            let (mut low, mut high) = (r, r);
+            low[c] -= d;
+            high[c] += d;
+            let (low, high) = (current.at(low), current.at(high));
+            for i in 0..2 {
+                let slope = (high[i] - low[i]) / (2.0 * d) * 2.0 / SIZE[c];
+                assert!((l[(i, c)] - slope).abs() < 1e-8, "{i} {c}");
+            }
+        }
+    }
+
+    #[test]
+    fn biquadratic_velocities_without_divergence_stay() {
+        // psi = x^2 y^2 + x^3 - 2 y^3 + x y
+        let f = |x: f64, y: f64| {
+            [2.0 * x * x * y - 6.0 * y * y + x, -(2.0 * x * y * y + 3.0 * x * x + y)]
+        };
+        let nodal = sampled(f, [0.4, -0.3]);
+        let current = Current::new(&nodal, SIZE);
+        for r in [[0.0, 0.0], [0.3, -0.8], [-0.95, 0.4]] {
+            let expected = interpolate(&nodal, &Shape::values(r));
+            let got = current.at(r);
+            assert!((0..2).all(|c| (got[c] - expected[c]).abs() < 1e-14));
+        }
+    }
+}
