@@ -2,6 +2,7 @@
 //! place, measured by one harness.
 
 mod cosserat;
+pub mod rayleigh_taylor;
 
 pub use cosserat::{Fluid, couette, coupled_cell, poiseuille};
 

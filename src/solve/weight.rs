@@ -61,6 +61,12 @@ impl Weight {
         }
     }
 
+    /// Mean density of each cell.
+    pub fn means(&self) -> Vec<f64> {
+        let mean = |d: &[f64; 9]| d.iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum();
+        self.at_gauss.iter().map(mean).collect()
+    }
+
     /// Integral of each shape function times the density, over the cell's area.
     pub fn nodal_mass(&self, cell: usize) -> [f64; 9] {
         let mut mass = [0.0; 9];

@@ -6,6 +6,7 @@ mod exact;
 mod laws;
 mod patch;
 mod rest;
+mod steps;
 
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse};
