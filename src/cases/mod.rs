@@ -5,6 +5,7 @@ mod cosserat;
 mod inclined;
 mod layers;
 mod measure;
+pub mod rayleigh_taylor;
 mod reference;
 mod small;
 mod solcx;

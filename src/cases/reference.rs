@@ -6,8 +6,9 @@ use crate::plan::boundary::add_body_force;
 use crate::plan::material::{Material, Texture};
 use crate::plan::{InitialDirector, Plan};
 use crate::sim::SimError;
+use crate::solve::buoyancy::Restoring;
 use crate::solve::quadrature::Quadrature;
-use crate::solve::stokes::{Stokes, Stopping};
+use crate::solve::stokes::{Loads, Stokes, Stopping};
 use crate::space::flow::Flow;
 
 impl Case {
@@ -78,8 +79,9 @@ fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
     let mut stokes = Stokes::new(mesh.clone(), constraints)?;
     let stopping =
         Stopping { tolerance: plan.method.tolerance, max_corrections: plan.method.max_corrections };
+    let loads = Loads { nodal: &load, restoring: &Restoring::default() };
     let mut flow = Flow::zero(mesh);
-    stokes.solve(&quadrature, &load, stopping, &mut flow).map_err(|source| SimError::Solve {
+    stokes.solve(&quadrature, loads, stopping, &mut flow).map_err(|source| SimError::Solve {
         step: 0,
         time: 0.0,
         source,

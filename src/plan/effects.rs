@@ -144,6 +144,22 @@ impl Plan {
             0,
             &["body force"],
         );
+        let stabilised = self.method.stabilisation;
+        add(
+            "stabilised stratification",
+            stabilised.is_some(),
+            why(
+                stabilised.is_some(),
+                format!(
+                    "more than one density in gravity: accuracy.stabilisation = {}",
+                    stabilised.unwrap_or(0.0)
+                ),
+                "no gravity, a single density, or accuracy.stabilisation = 0",
+            ),
+            0,
+            0,
+            &["restoring loads"],
+        );
         add(
             "fixed body force",
             self.body_force.is_some(),

@@ -172,6 +172,9 @@ pub struct Method {
     pub seeding: Seeding,
     pub quadrature: Quadrature,
     pub integrator: Integrator,
+    /// Share of the next step by which restoring loads are taken ahead; `None` where no density
+    /// contrast could restore anything, or where it was switched off.
+    pub stabilisation: Option<f64>,
     pub tolerance: f64,
     pub max_corrections: u32,
 }

@@ -95,10 +95,20 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
             plan.clock.stops.push(t);
         }
     }
+    let stratified = std::iter::once(&plan.state)
+        .chain(plan.changes.iter().map(|c| &c.state))
+        .any(|matter| plan.effects.gravity && has_contrast(&matter.materials));
+    let share = scene.accuracy.stabilisation;
+    plan.method.stabilisation = (stratified && share > 0.0).then_some(share);
     plan.clock.stops.sort_by(f64::total_cmp);
     let least = 1e-9 * plan.clock.end;
     plan.clock.stops.dedup_by(|b, a| *b - *a < least);
     Ok(plan)
+}
+
+/// Whether there is more than one density.
+fn has_contrast(materials: &[Material]) -> bool {
+    materials.iter().any(|m| m.carries_density || m.density != materials[0].density)
 }
 
 /// What a scheduled change must leave as it is, in SI units.
@@ -1449,6 +1459,12 @@ fn method(scene: &Scene) -> Result<Method> {
             "give 1e-14 to 1e-2; 1e-12 is the floor that double precision allows in stiff scenes",
         ));
     }
+    if !(0.0..=2.0).contains(&a.stabilisation) {
+        return Err(SceneError::new(
+            format!("accuracy.stabilisation is {}", a.stabilisation),
+            "give a share of a step, 0.6 to 1, or 0 to switch it off; 0.75 is usual",
+        ));
+    }
     if a.max_corrections == 0 {
         return Err(SceneError::new(
             "accuracy.max_corrections is 0",
@@ -1459,6 +1475,7 @@ fn method(scene: &Scene) -> Result<Method> {
         seeding: Seeding { side, placement: a.placement, seed: a.seed },
         quadrature: a.quadrature,
         integrator: a.integrator,
+        stabilisation: None,
         tolerance: a.tolerance,
         max_corrections: a.max_corrections,
     })

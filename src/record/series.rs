@@ -39,6 +39,8 @@ pub fn columns(plan: &Plan) -> Vec<String> {
     list.extend(
         [
             "max_speed",
+            "rms_speed",
+            "stabilisation",
             "potential_energy",
             "work",
             "dissipated",
@@ -85,8 +87,10 @@ impl SeriesWriter {
             line += &format!(",{},{}", g.volume, g.rate);
         }
         line += &format!(
-            ",{},{},{},{},{:e},{},{},{},{}",
+            ",{},{},{:e},{},{},{},{:e},{},{},{},{}",
             row.max_speed,
+            row.rms_speed,
+            row.stabilisation,
             row.potential_energy,
             row.work,
             row.dissipated,

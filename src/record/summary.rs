@@ -37,6 +37,7 @@ pub struct Summary {
     pub steps: u64,
     pub time: f64,
     pub max_speed: f64,
+    pub rms_speed: f64,
     pub particles: usize,
     pub cells: [usize; 2],
     pub unknowns: Unknowns,
@@ -129,6 +130,7 @@ impl Summary {
             steps: row.step,
             time: row.time,
             max_speed: row.max_speed,
+            rms_speed: row.rms_speed,
             particles: row.particles,
             cells: [plan.mesh.x.cells(), plan.mesh.y.cells()],
             unknowns: Unknowns {

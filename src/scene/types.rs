@@ -404,6 +404,10 @@ pub struct Accuracy {
     pub placement: Placement,
     pub quadrature: Quadrature,
     pub integrator: Integrator,
+    /// Share of the next step by which the load of a stable stratification (heavy below light) is
+    /// taken ahead, so that large steps do not slosh: 0.6 to 1; 0 switches it off. Acts only in
+    /// scenes with gravity and more than one density, and leaves the order in time as it is.
+    pub stabilisation: f64,
     /// Of the solver: relative residual and divergence.
     pub tolerance: f64,
     /// Corrections of the solver before it is declared not converged.
@@ -511,6 +515,7 @@ impl Default for Accuracy {
             placement: Placement::Regular,
             quadrature: Quadrature::Mixture,
             integrator: Integrator::Extrapolated,
+            stabilisation: 0.75,
             tolerance: 1e-12,
             max_corrections: 40,
             seed: 1,

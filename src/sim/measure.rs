@@ -30,12 +30,14 @@ pub fn empty_row(plan: &Plan) -> Row {
         wall: 0.0,
         power_in: 0.0,
         dissipation: 0.0,
+        stabilisation: 0.0,
         power_error: 0.0,
         divergence_error: 0.0,
         volume_error: 0.0,
         iterations: 0,
         particles: 0,
         max_speed: 0.0,
+        rms_speed: 0.0,
         potential_energy: 0.0,
         work: 0.0,
         dissipated: 0.0,
@@ -185,6 +187,7 @@ impl<const D: usize> Simulation<D> {
         let u = &plan.units;
         let r = self.report;
         let (power_in, dissipation) = (r.power_in * u.power(), r.dissipation * u.power());
+        let stabilisation = r.restoring * u.power();
         let other = self.other_power() * u.power();
         let dt_si = dt * u.time;
         let before = &self.row;
@@ -225,12 +228,18 @@ impl<const D: usize> Simulation<D> {
             wall: 0.0,
             power_in,
             dissipation,
-            power_error: if larger > 0.0 { (power_in - dissipation).abs() / larger } else { 0.0 },
+            stabilisation,
+            power_error: if larger > 0.0 {
+                (power_in - dissipation - stabilisation).abs() / larger
+            } else {
+                0.0
+            },
             divergence_error: r.divergence,
             volume_error: self.volume_error(),
             iterations,
             particles: self.particles.len(),
             max_speed: self.flow.max_speed() * u.velocity(),
+            rms_speed: self.flow.rms_speed(&plan.mesh) * u.velocity(),
             potential_energy: self.potential_energy() * u.energy(),
             work,
             dissipated,

@@ -25,11 +25,12 @@ use crate::motion::tracers::DyeLines;
 use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
 use crate::scene::{Integrator, Quadrature as Rule};
+use crate::solve::buoyancy::Restoring;
 use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
-use crate::solve::stokes::{Report, SolveError, Stokes, Stopping};
+use crate::solve::stokes::{Loads, Report, SolveError, Stokes, Stopping};
 use crate::solve::weight::Weight;
-use crate::space::balance::Balance;
+use crate::space::balance::{Balance, Face, open_faces};
 use crate::space::flow::Flow;
 use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
@@ -95,6 +96,9 @@ pub struct Simulation<const D: usize> {
     stokes: Stokes<D>,
     quadrature: Quadrature,
     weight: Weight,
+    restoring: Restoring,
+    /// Those that restoring terms may lie on; none where no scene calls for them.
+    restoring_faces: Vec<Face>,
     particles: Particles,
     flow: Flow<D>,
     /// Velocity of the solution before, and the step between the two.
@@ -173,6 +177,12 @@ impl<const D: usize> Simulation<D> {
         }
         let mut sim = Simulation {
             quadrature: Quadrature::new(&mesh, plan.method.quadrature, plan.state.materials.len()),
+            restoring: Restoring::default(),
+            restoring_faces: if plan.method.stabilisation.is_some() {
+                open_faces(&mesh, &plan.enclosure)
+            } else {
+                Vec::new()
+            },
             weight: Weight::new(
                 &mesh,
                 Neighbours::new(&mesh, &plan.enclosure),
@@ -204,7 +214,7 @@ impl<const D: usize> Simulation<D> {
         };
         sim.apply_changes();
         let mut seconds = Phases::default();
-        sim.solve(&mut seconds)?;
+        sim.solve(None, &mut seconds)?;
         sim.baseline = sim.projected_shares();
         sim.measure(0.0, Limiter::Start, seconds, sim.report.corrections, clock);
         Ok(sim)
@@ -261,8 +271,9 @@ impl<const D: usize> Simulation<D> {
         self.step += 1;
         let changed = self.apply_changes();
         let before = self.flow.translation();
-        self.solve(&mut seconds)?;
         // After a sudden change the velocity before says nothing about the one to come.
+        let ahead = (!changed).then(|| self.ahead(self.expected_step(dt)));
+        self.solve(ahead.flatten().map(|t| (t, before.clone())), &mut seconds)?;
         self.previous = (!changed).then_some((before, dt));
         self.measure(dt, limiter, seconds, extra + self.report.corrections, clock);
         Ok(())
@@ -326,7 +337,10 @@ impl<const D: usize> Simulation<D> {
         seconds.motion += phase.elapsed().as_secs_f64();
         let here = std::mem::replace(&mut self.particles, ahead);
         let flow = self.flow.clone();
-        let solved = self.solve(seconds);
+        // At the first step a mode must at worst turn round: half a step ahead, neither more nor
+        // less, makes that the trapezoidal rule.
+        let ahead = self.ahead(dt).map(|t| if self.previous.is_none() { 0.5 * dt } else { t });
+        let solved = self.solve(ahead.map(|t| (t, now)), seconds);
         let half = std::mem::replace(&mut self.flow, flow).translation();
         self.particles = here;
         solved?;
@@ -359,8 +373,24 @@ impl<const D: usize> Simulation<D> {
         any
     }
 
-    /// Solves for the flow of the particles where they are.
-    fn solve(&mut self, seconds: &mut Phases) -> Result<(), SimError> {
+    /// How far ahead restoring loads are taken, for a step of `dt`.
+    fn ahead(&self, dt: f64) -> Option<f64> {
+        self.plan.method.stabilisation.map(|share| share * dt)
+    }
+
+    /// The step to come, as far as the flow before and the step before can tell.
+    fn expected_step(&self, dt: f64) -> f64 {
+        let (next, _) = next_step(&self.plan.clock, self.time, Some(dt), self.speeds());
+        if next > 0.0 { next } else { dt }
+    }
+
+    /// Solves for the flow of the particles where they are. `restoring`: how far ahead restoring
+    /// loads are taken, and the velocity before.
+    fn solve(
+        &mut self,
+        restoring: Option<(f64, Vec<[f64; 2]>)>,
+        seconds: &mut Phases,
+    ) -> Result<(), SimError> {
         let plan = self.plan.clone();
         let phase = Instant::now();
         let (step, time) = (self.step, self.si_time());
@@ -372,19 +402,38 @@ impl<const D: usize> Simulation<D> {
             SimError::Empty { step, time, source }
         })?;
         self.update_load();
+        self.update_restoring(restoring);
         seconds.quadrature += phase.elapsed().as_secs_f64();
         let stopping = Stopping {
             tolerance: plan.method.tolerance,
             max_corrections: plan.method.max_corrections,
         };
+        let loads = Loads { nodal: &self.load, restoring: &self.restoring };
         self.report =
-            self.stokes.solve(&self.quadrature, &self.load, stopping, &mut self.flow).map_err(
+            self.stokes.solve(&self.quadrature, loads, stopping, &mut self.flow).map_err(
                 |source| SimError::Solve { step, time, source: source.scaled(plan.units.length) },
             )?;
         seconds.assemble += self.report.seconds.assemble;
         seconds.factor += self.report.seconds.factor;
         seconds.solve += self.report.seconds.solve;
         Ok(())
+    }
+
+    fn update_restoring(&mut self, restoring: Option<(f64, Vec<[f64; 2]>)>) {
+        match restoring {
+            Some((ahead, before)) => {
+                // First-order stepping has no other use for the velocity before.
+                let before = match self.plan.method.integrator {
+                    Integrator::Euler => vec![[0.0; 2]; before.len()],
+                    Integrator::Extrapolated | Integrator::Midpoint => before,
+                };
+                let means = self.weight.means();
+                let load = (self.matter.gravity, ahead);
+                let mesh = &self.plan.mesh;
+                self.restoring.update(mesh, &self.restoring_faces, &means, load, before);
+            }
+            None => self.restoring.clear(),
+        }
     }
 
     fn update_load(&mut self) {

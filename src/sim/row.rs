@@ -18,7 +18,10 @@ pub struct Row {
     pub power_in: f64,
     /// Viscous dissipation, W/m.
     pub dissipation: f64,
-    /// `|power_in - dissipation|` over the larger of the two.
+    /// Power that the stabilisation of stratified fluids takes from the flow, W/m: numerical, of
+    /// second order in the step, either sign.
+    pub stabilisation: f64,
+    /// `|power_in - dissipation - stabilisation|` over the larger of the first two.
     pub power_error: f64,
     /// L2 norm of the projected divergence over that of the strain rate.
     pub divergence_error: f64,
@@ -29,6 +32,8 @@ pub struct Row {
     pub particles: usize,
     /// m/s
     pub max_speed: f64,
+    /// Root mean square over the domain without solids, m/s.
+    pub rms_speed: f64,
     /// Of the particles in gravity, less the background's, J/m.
     pub potential_energy: f64,
     /// Time integral of the power of everything but gravity, and what scheduled changes of gravity

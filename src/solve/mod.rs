@@ -1,6 +1,7 @@
 //! Solving for velocity, rotation and pressure: integration points, element matrices, the
 //! sparse factor, corrections.
 
+pub mod buoyancy;
 pub mod cholesky;
 pub mod element;
 pub mod interface;

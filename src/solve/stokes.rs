@@ -20,6 +20,7 @@
 //! the pocket approach by a share `r eta/eta_stiff` each, is so found at once; the residuals are
 //! always computed afresh from the fields.
 
+use super::buoyancy::{Restoring, SIDE_NODES};
 use super::cholesky::{FactorError, SparseCholesky};
 use super::element::{
     Condensed, Divergence, Internal, LOCAL, Matrix, Nodal, PointShape, SKELETON_NODES,
@@ -63,6 +64,8 @@ pub struct Report {
     pub power_in: f64,
     /// Viscous dissipation.
     pub dissipation: f64,
+    /// Power that the restoring terms of [`super::buoyancy`] take from the flow; numerical.
+    pub restoring: f64,
     /// `||f||^2_{1/D}`: the power the loads would have on a mesh of one element; a scale for
     /// powers that rounding alone makes.
     pub load_scale: f64,
@@ -132,10 +135,18 @@ struct CellMatrix<const D: usize> {
     penalty: [f64; 3],
 }
 
+/// What drives a solution.
+#[derive(Clone, Copy)]
+pub struct Loads<'a, const D: usize> {
+    /// Force (and couple) at each node.
+    pub nodal: &'a [[f64; D]],
+    pub restoring: &'a Restoring,
+}
+
 /// What a solution is asked for.
 struct Given<'a, const D: usize> {
     quadrature: &'a Quadrature,
-    load: &'a [[f64; D]],
+    loads: Loads<'a, D>,
     stopping: Stopping,
 }
 
@@ -189,6 +200,7 @@ struct Residual<const D: usize> {
     /// `B u + C p`
     divergence: Vec<[f64; 3]>,
     dissipation: f64,
+    restoring: f64,
     strain: f64,
     divergence_norm: f64,
 }
@@ -249,18 +261,17 @@ impl<const D: usize> Stokes<D> {
     pub fn unknowns(&self) -> usize {
         self.mesh.nodes() * D
     }
-    /// Solves for `flow`, starting from what it holds. `load` is the force (and couple) at each
-    /// node.
+    /// Solves for `flow`, starting from what it holds.
     pub fn solve(
         &mut self,
         quadrature: &Quadrature,
-        load: &[[f64; D]],
+        loads: Loads<D>,
         stopping: Stopping,
         flow: &mut Flow<D>,
     ) -> Result<Report, SolveError> {
         let mut report = Report::default();
         let clock = Instant::now();
-        report.active_rotation = self.assemble(quadrature);
+        report.active_rotation = self.assemble(quadrature, loads.restoring);
         report.seconds.assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         self.matrix.factorize().map_err(|e| self.explain(e))?;
@@ -270,7 +281,7 @@ impl<const D: usize> Stokes<D> {
         let mut work = std::mem::take(&mut self.work);
         work.kept = 0;
         let outcome =
-            self.iterate(&Given { quadrature, load, stopping }, flow, &mut report, &mut work);
+            self.iterate(&Given { quadrature, loads, stopping }, flow, &mut report, &mut work);
         self.work = work;
         outcome?;
         self.constraints.remove_null_space(&self.mesh, flow);
@@ -286,13 +297,15 @@ impl<const D: usize> Stokes<D> {
         report: &mut Report,
         work: &mut Work<D>,
     ) -> Result<(), SolveError> {
-        let &Given { quadrature, load, stopping } = given;
+        let &Given { quadrature, loads, stopping } = given;
+        let load = loads.nodal;
         loop {
-            self.residual(quadrature, load, flow, &mut work.residual);
+            self.residual(quadrature, loads, flow, &mut work.residual);
             let residual = &work.residual;
             (report.residual, report.divergence, report.load_scale) =
                 self.norms(residual, load, flow);
             report.dissipation = residual.dissipation;
+            report.restoring = residual.restoring;
             report.power_in = self.power_in(residual, load, flow);
             if !(report.residual.is_finite() && report.divergence.is_finite()) {
                 return Err(SolveError::NonFinite { corrections: report.corrections });
@@ -313,7 +326,7 @@ impl<const D: usize> Stokes<D> {
 
     /// Element matrices of the cells that changed, and the skeleton matrix; number of active
     /// rotation unknowns.
-    fn assemble(&mut self, quadrature: &Quadrature) -> usize {
+    fn assemble(&mut self, quadrature: &Quadrature, restoring: &Restoring) -> usize {
         self.matrix.values_mut().fill(0.0);
         self.diagonal.iter_mut().for_each(|d| *d = [0.0; D]);
         for cell in 0..self.mesh.cells() {
@@ -327,6 +340,7 @@ impl<const D: usize> Stokes<D> {
             }
             self.scatter(cell);
         }
+        self.add_restoring(restoring);
         self.matrix.fill_empty_diagonal();
         if D == 3 { self.diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
     }
@@ -404,17 +418,74 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
+    /// Adds the terms of faces, whose nodes the skeleton has all.
+    fn add_restoring(&mut self, restoring: &Restoring) {
+        for face in &restoring.faces {
+            let nodes = self.nodes[face.cell];
+            let side = SIDE_NODES[face.normal];
+            for (k, &a) in side.iter().enumerate() {
+                for c in 0..2 {
+                    self.diagonal[nodes[a]][c] += restoring.entry(face, [k, k], [c, c]);
+                }
+                for (l, &b) in side.iter().enumerate().take(k + 1) {
+                    self.add_block(face.cell, [a, b], |r, c| restoring.entry(face, [k, l], [r, c]));
+                }
+            }
+        }
+    }
+
+    /// Adds velocity entries to the matrix for nodes `a >= b` on the rim of a cell.
+    fn add_block(&mut self, cell: usize, [a, b]: [usize; 2], entry: impl Fn(usize, usize) -> f64) {
+        let nodes = [a, b].map(|n| self.nodes[cell][n]);
+        let position = nodes.map(|n| self.skeleton.position[n] as usize);
+        // Local nodes without the centre.
+        let [k, l] = [a, b].map(|n| n - usize::from(n > CENTRE));
+        for r in 0..2 {
+            for c in 0..2 {
+                if self.constraints.is_fixed(nodes[0], r) || self.constraints.is_fixed(nodes[1], c)
+                {
+                    continue;
+                }
+                let at = if k == l {
+                    if r < c {
+                        continue;
+                    }
+                    self.matrix.diagonal_entry(position[0], r, c)
+                } else {
+                    let rank = self.scatter[cell][pair(k, l)] as usize;
+                    if position[0] > position[1] {
+                        self.matrix.block_start(position[1], rank, c) + r
+                    } else {
+                        self.matrix.block_start(position[0], rank, r) + c
+                    }
+                };
+                self.matrix.values_mut()[at] += entry(r, c);
+            }
+        }
+    }
+
     fn residual(
         &self,
         quadrature: &Quadrature,
-        load: &[[f64; D]],
+        Loads { nodal, restoring }: Loads<D>,
         flow: &Flow<D>,
         out: &mut Residual<D>,
     ) {
         out.force.clear();
-        out.force.extend_from_slice(load);
+        out.force.extend_from_slice(nodal);
         out.divergence.resize(self.mesh.cells(), [0.0; 3]);
         (out.dissipation, out.strain, out.divergence_norm) = (0.0, 0.0, 0.0);
+        out.restoring = 0.0;
+        for face in &restoring.faces {
+            let nodes = SIDE_NODES[face.normal].map(|a| self.nodes[face.cell][a]);
+            let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
+            let (force, power) = restoring.force(face, nodes, u);
+            out.restoring += power;
+            for (node, f) in nodes.into_iter().zip(force) {
+                out.force[node][0] += f[0];
+                out.force[node][1] += f[1];
+            }
+        }
         for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
             let size = self.mesh.cell_size(cell);
             let area = size[0] * size[1];

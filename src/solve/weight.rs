@@ -71,6 +71,12 @@ impl Weight {
         }
     }
 
+    /// Mean density of each cell.
+    pub fn means(&self) -> Vec<f64> {
+        let mean = |d: &[f64; 9]| d.iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum();
+        self.at_gauss.iter().map(mean).collect()
+    }
+
     /// Mass at each Gauss point as a share of the cell's area, reference coordinates, shape
     /// functions.
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {

@@ -1,7 +1,7 @@
 //! The unknowns: velocity (and rotation) at nodes, pressure in cells, and their interpolation.
 
 use super::mesh::Mesh;
-use super::shape::{NODES, Shape};
+use super::shape::{GAUSS_3X3, NODES, Shape};
 use nalgebra::Matrix2;
 
 /// Velocity (and rotation) at the mesh's nodes, pressure in its cells.
@@ -42,6 +42,21 @@ impl<const D: usize> Flow<D> {
 
     pub fn max_speed(&self) -> f64 {
         self.velocity.iter().map(|u| u[0].hypot(u[1])).fold(0.0, f64::max)
+    }
+
+    /// Root mean square of the speed over all cells that are not solid.
+    pub fn rms_speed(&self, mesh: &Mesh) -> f64 {
+        let (mut sum, mut area) = (0.0, 0.0);
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let nodal = self.of_cell(mesh, cell);
+            let squares = GAUSS_3X3.iter().map(|g| {
+                let u = interpolate(&nodal, &g.shape.n);
+                g.weight * (u[0] * u[0] + u[1] * u[1])
+            });
+            sum += mesh.cell_area(cell) * squares.sum::<f64>();
+            area += mesh.cell_area(cell);
+        }
+        (sum / area).sqrt()
     }
 }
 

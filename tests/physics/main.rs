@@ -8,6 +8,7 @@ mod laws;
 mod order;
 mod patch;
 mod rest;
+mod steps;
 
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse};
