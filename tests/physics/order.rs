@@ -107,11 +107,9 @@ fn directors_of_one_angle_in_a_sheared_layer() {
         let turned = (angle.sin() - n[1] / n[0] * angle.cos()) / angle.cos();
         (turned - exact).abs()
     };
-    let errors = [0.01, 0.005, 0.0025, 0.00125].map(error);
-    order("shear", &errors);
-    // Single orders vary with how the last steps are cut to meet the end.
-    let mean = (errors[0] / errors[3]).log2() / 3.0;
-    assert!(mean > 1.8, "{mean}");
+    // Below, 0.008 of a shear of ten or more stays: a layer that softens is not quite uniform.
+    let shear = order("shear", &[0.01, 0.005, 0.0025].map(error));
+    assert!(shear > 1.8, "{shear}");
 }
 
 #[test]
