@@ -8,6 +8,7 @@
 //! control the population       no cell empty or overfull
 //! balance volumes              a cell's particles fill it (incompressible scenes)
 //! integration points           local harmonic mixture of each cell's particles
+//! weight, restoring loads      density of each cell; stable strata ahead of time
 //! solve                        velocity, rotation, pressure
 //! ```
 
