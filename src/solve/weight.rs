@@ -12,18 +12,25 @@
 //! which serve the viscosity, would carry the noise of the particles' places into the load: a
 //! level at rest inside a cell of 32 then moves with 3e-3 rho g a^2/eta at a viscosity contrast of
 //! 1000, and not at all with exact moments. `rho_m` is a quadratic fit where particles carry their
-//! density; where a cell's own do not determine it, those of its neighbours help.
+//! density; those of neighbouring cells help a little.
 
 use super::quadrature::{Content, Quadrature};
 use crate::plan::material::Material;
-use crate::space::fit::{Degree, Fit, Polynomial};
+use crate::space::fit::{Degree, Fit};
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
 use crate::space::shape::GAUSS_3X3;
 
-/// Weight of a neighbour's particle in a fit, beside the cell's own: less, since it is farther.
-const LENT: f64 = 0.1;
+/// Weight of a neighbour's particle in a fit beside the cell's own, by its reference coordinates.
+///
+/// Sixteen particles at random places determine six coefficients badly now and then; a few from
+/// next door, however lightly they count, mend that. On the steady vortex at 32 cells with random
+/// particles the velocity error is 2.3 times the particle-free one without them and 1.3 times with
+/// them; three times the weight, or no decay, makes it 3 and 10 times.
+fn lent([x, y]: [f64; 2]) -> f64 {
+    0.1 * ((2.0 - x * x - y * y) / 0.7).exp().min(1.0)
+}
 
 /// Densities at the 3 x 3 Gauss points of each cell.
 pub struct Weight {
@@ -104,20 +111,17 @@ impl Weight {
         }
     }
 
-    /// Lends particles of neighbouring cells to fits that a cell's own do not determine.
+    /// Lends particles of neighbouring cells to the fits of carried densities.
     fn help(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
         let Some(density) = &particles.density else { return };
         for (m, part) in self.parts.iter_mut().enumerate() {
-            let lacks = |p: Polynomial| p.degree < Degree::Quadratic && p.varies();
-            if !materials[m].carries_density
-                || !part.density.solve(Degree::Quadratic).is_some_and(lacks)
-            {
+            if !materials[m].carries_density {
                 continue;
             }
             for p in self.neighbours.of(cell).flat_map(|n| particles.of_cell(n)) {
                 if particles.material[p] as usize == m {
                     let r = mesh.to_near_reference(cell, particles.position[p]);
-                    part.density.borrow(LENT * particles.volume[p], r, density[p]);
+                    part.density.borrow(lent(r) * particles.volume[p], r, density[p]);
                 }
             }
         }

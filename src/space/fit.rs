@@ -190,11 +190,6 @@ impl Polynomial {
         [1.0, u, v, u * u, u * v, v * v]
     }
 
-    /// The values it was fitted to were not all the same.
-    pub fn varies(&self) -> bool {
-        self.low < self.high
-    }
-
     pub fn at(&self, r: [f64; 2]) -> f64 {
         self.terms(r).iter().zip(&self.coefficient).map(|(t, c)| t * c).sum()
     }

@@ -82,7 +82,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         out.check(
             format!("mean |n_x| at shear {g}"),
             alignment,
-            Bound::Within(alignment_of(g), 3e-3),
+            Bound::Within(alignment_of(g), 5e-3),
         );
         out.check(
             format!("viscosity at shear {g}, Pa s"),
