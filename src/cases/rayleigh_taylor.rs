@@ -1,6 +1,11 @@
 //! Linear theory of the Rayleigh-Taylor instability of two viscous layers.
 
+use super::CaseError;
+use crate::plan::resolve;
+use crate::scene::{SceneSource, parse};
+use crate::sim;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Two layers between plates without slip, free slip (or symmetry) at the sides. SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +80,52 @@ pub fn ramberg_growth_rate(layers: &Layers) -> f64 {
     let j22 = phi[1] * (r * square_1 - square_2);
     let k = -d12 / (c11 * j22 - d12 * i21);
     k * (upper.density - lower.density) * gravity * lower.thickness / (2.0 * lower.viscosity)
+}
+
+/// A light layer of thickness 0.2 below a heavy one in a box of height 1, in units of the heavy
+/// fluid.
+#[derive(Clone, Copy, Debug)]
+pub struct Undulation {
+    pub wavelength: f64,
+    /// Viscosity of the light layer over that of the heavy one.
+    pub viscosity: f64,
+    pub amplitude: f64,
+}
+
+/// Computed growth rate of the interface's first Fourier mode over that of linear theory.
+pub fn growth_ratio(u: Undulation, cells: u32, sets: &[&str]) -> Result<f64, CaseError> {
+    const THICKNESS: f64 = 0.2;
+    let Undulation { wavelength, viscosity, amplitude } = u;
+    let text = format!(
+        "schema = 1\nname = \"growth\"\ngravity = [0, -1]\n[domain]\nx = [0, \"{wavelength}/2\"]\n\
+         y = [0, 1]\nlength_scale = 1\n[accuracy]\ncells = {cells}\n[time]\nend = 1\n\
+         [materials.heavy]\ndensity = 1\nshear_viscosity = 1\n\
+         [materials.light]\nshear_viscosity = {viscosity}\n\
+         [[regions]]\nmaterial = \"heavy\"\n[[regions]]\nmaterial = \"light\"\n\
+         shape.where = \"y < {THICKNESS} + {amplitude}*cos(2*pi*x/{wavelength})\"\n\
+         [boundaries]\nbottom.kind = \"no_slip\"\ntop.kind = \"no_slip\"\n"
+    );
+    let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+    let source = SceneSource::new("growth", text).with_sets(&sets)?;
+    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
+    let run = sim::start(Arc::new(plan))?;
+    let layer = |thickness, viscosity, density| Layer { thickness, viscosity, density };
+    let theory = ramberg_growth_rate(&Layers {
+        upper: layer(1.0 - THICKNESS, 1.0, 1.0),
+        lower: layer(THICKNESS, viscosity, 0.0),
+        wavelength,
+        gravity: 1.0,
+    });
+    // First Fourier coefficient of the velocity along the interface.
+    const POINTS: u32 = 64;
+    let mode: f64 = (0..POINTS)
+        .map(|k| {
+            let phase = PI * (f64::from(k) + 0.5) / f64::from(POINTS);
+            let x = phase * wavelength / (2.0 * PI);
+            run.velocity_at([x, THICKNESS])[1] * phase.cos() * 2.0 / f64::from(POINTS)
+        })
+        .sum();
+    Ok(mode / amplitude / theory)
 }
 
 #[cfg(test)]

@@ -8,9 +8,12 @@ mod corners;
 mod cut_cells;
 mod elements;
 mod layers;
+mod rayleigh_taylor;
 mod report;
+mod rest;
 mod smooth;
 mod texture;
+mod transport;
 
 pub use report::{Bound, Check, Figure, Report, Section, Table, number, rate};
 
@@ -39,10 +42,13 @@ impl Effort {
 type Subject = fn(Effort) -> Result<Section, CaseError>;
 
 /// All subjects: name for the command line, and function.
-pub const SUBJECTS: [(&str, Subject); 6] = [
+pub const SUBJECTS: [(&str, Subject); 9] = [
     ("elements", elements::section),
     ("smooth", smooth::section),
     ("cut-cells", cut_cells::section),
+    ("transport", transport::section),
+    ("rest", rest::section),
+    ("rayleigh-taylor", rayleigh_taylor::section),
     ("corners", corners::section),
     ("layers", layers::section),
     ("texture", texture::section),

@@ -1,0 +1,162 @@
+//! Heavy over light at rest, and disturbed levels at large steps.
+
+use super::Effort;
+use super::report::{Bound, Figure, Section, Table, number};
+use crate::cases::CaseError;
+use crate::plan::resolve;
+use crate::scene::{SceneSource, parse, presets};
+use crate::sim::{self, Run};
+use std::sync::Arc;
+
+const PLACEMENTS: [&str; 3] = ["regular", "jittered", "random"];
+
+fn start(source: &SceneSource) -> Result<Box<dyn Run>, CaseError> {
+    let plan = resolve(&parse(source)?).map_err(|e| e.with_source(source))?;
+    Ok(sim::start(Arc::new(plan))?)
+}
+
+pub fn section(effort: Effort) -> Result<Section, CaseError> {
+    let mut out = Section {
+        title: "Rest, and the way to it",
+        about: "*At rest*: largest speed after a step, over rho g a^2/eta of the heavy fluid, in a \
+                closed box (`hydrostatic`, viscosity contrast 1000) with the level inside a cell, \
+                and for a density that falls off smoothly. Gravity oblique to the mesh bends the \
+                pressure in a way that its element cannot follow; that speed must fall at second \
+                order. The leading particle-in-cell code is left with about 1e-5 of its flow's speed when \
+                converged tightly, 4e-3 at its defaults. *Large steps*: a cosine of the level \
+                relaxes; tau is its relaxation time. Restoring loads are taken ahead of the step \
+                (`accuracy.stabilisation`; Kaus et al. 2010)."
+            .into(),
+        ..Section::default()
+    };
+    at_rest(effort, &mut out)?;
+    oblique(effort, &mut out)?;
+    relaxation(&mut out)?;
+    Ok(out)
+}
+
+fn at_rest(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
+    let mut table = Table::new("At rest", &["scene", "cells", "regular", "jittered", "random"]);
+    let mut worst: f64 = 0.0;
+    for &cells in effort.take(&[16, 32]) {
+        for level in ["0.51", "0.5137"] {
+            let mut row = vec![format!("level at {level}"), cells.to_string()];
+            for placement in PLACEMENTS {
+                let sets = [
+                    format!("accuracy.cells={cells}"),
+                    format!("level={level}"),
+                    format!("accuracy.placement={placement}"),
+                ];
+                let mut run = start(&presets::find("hydrostatic")?.with_sets(&sets)?)?;
+                run.step()?;
+                let speed = run.row().max_speed / 100.0;
+                worst = worst.max(speed);
+                row.push(number(speed));
+            }
+            table.rows.push(row);
+        }
+        let mut row = vec!["exponential strata".into(), cells.to_string()];
+        for placement in PLACEMENTS {
+            let material = "[materials.a]\ndensity = \"1000*exp(-3*y)\"\nshear_viscosity = 100\n\
+                            [[regions]]\nmaterial = \"a\"\n";
+            let mut run = start(&resting("[0, -10]", cells, placement, material))?;
+            run.step()?;
+            let speed = run.row().max_speed / 100.0;
+            worst = worst.max(speed);
+            row.push(number(speed));
+        }
+        table.rows.push(row);
+    }
+    out.tables.push(table);
+    out.check("largest speed at rest", worst, Bound::AtMost(1e-6));
+    Ok(())
+}
+
+fn resting(gravity: &str, cells: u32, placement: &str, rest: &str) -> SceneSource {
+    let text = format!(
+        "schema = 1\nname = \"rest\"\ngravity = {gravity}\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
+         [accuracy]\ncells = {cells}\nplacement = \"{placement}\"\n[time]\nend = 1\n{rest}"
+    );
+    SceneSource::new("rest", text)
+}
+
+fn oblique(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
+    let level = "[materials.a]\ndensity = 1000\nshear_viscosity = 100\n\
+                 [materials.b]\nshear_viscosity = 100\nbackground = true\n\
+                 [[regions]]\nmaterial = \"a\"\n\
+                 shape.where = \"0.6*(x-0.5) - 0.8*(y-0.5137) > 0\"\n";
+    let strata = "[materials.a]\ndensity = \"1000*exp(2*(0.6*x-0.8*y))\"\nshear_viscosity = 100\n\
+                  [[regions]]\nmaterial = \"a\"\n";
+    let mut table =
+        Table::new("Gravity oblique to the mesh", &["scene", "16", "32", "64", "order"]);
+    for (name, rest, least) in [("level", level, 1.8), ("strata", strata, 2.5)] {
+        let mut speeds = vec![];
+        for &cells in effort.take(&[16, 64, 32]) {
+            let speed =
+                start(&resting("[6, -8]", cells, "jittered", rest))?.row().max_speed / 100.0;
+            speeds.push((cells, speed));
+        }
+        speeds.sort_by_key(|s| s.0);
+        let (Some(first), Some(last)) = (speeds.first(), speeds.last()) else { continue };
+        let order = super::rate(*first, *last);
+        let mut row = vec![name.to_string()];
+        for cells in [16, 32, 64] {
+            let known = speeds.iter().find(|s| s.0 == cells);
+            row.push(known.map_or(String::new(), |s| number(s.1)));
+        }
+        row.push(format!("{order:.2}"));
+        table.rows.push(row);
+        out.check(format!("oblique {name}: order of the speed"), order, Bound::AtLeast(least));
+    }
+    out.tables.push(table);
+    Ok(())
+}
+
+fn relaxation(out: &mut Section) -> Result<(), CaseError> {
+    const AMPLITUDE: f64 = 0.1;
+    let text = format!(
+        "schema = 1\nname = \"slosh\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
+         [accuracy]\ncells = 16\n[time]\nend = 1e12\n[recording]\nframes = 1\n\
+         [materials.heavy]\ndensity = 1\nshear_viscosity = 1\n[materials.light]\n\
+         shear_viscosity = 1\n[[regions]]\nmaterial = \"light\"\n[[regions]]\n\
+         material = \"heavy\"\nshape.where = \"y < 0.5 + {AMPLITUDE}*cos(pi*x)\"\n"
+    );
+    let mut table = Table::new(
+        "A level relaxes in 30 steps that only Courant 0.5 limits",
+        &["stabilisation", "longest step / tau", "speed of the last 10 steps / first"],
+    );
+    let mut figure = Figure {
+        name: "sloshing".into(),
+        title: "A disturbed level, steps limited by the Courant number only".into(),
+        x: "step",
+        y: "largest speed / first",
+        logarithmic: false,
+        curves: vec![],
+    };
+    for (name, value) in [("0.75 (default)", 0.75), ("0 (off)", 0.0)] {
+        let sets = [format!("accuracy.stabilisation={value}")];
+        let mut run = start(&SceneSource::new("slosh", text.as_str()).with_sets(&sets)?)?;
+        let tau = -AMPLITUDE / run.velocity_at([0.0, 0.5])[1];
+        let first = run.row().max_speed;
+        let (mut longest, mut late) = (0.0f64, 0.0f64);
+        let mut curve = vec![(0.0, 1.0)];
+        for step in 1..=30 {
+            run.step()?;
+            longest = longest.max(run.row().dt / tau);
+            let speed = run.row().max_speed / first;
+            curve.push((f64::from(step), speed));
+            if step > 20 {
+                late = late.max(speed);
+            }
+        }
+        table.rows.push(vec![name.into(), number(longest), number(late)]);
+        figure.curves.push((format!("stabilisation {name}"), curve));
+        if value > 0.0 {
+            out.check("stabilised: longest step / tau", longest, Bound::AtLeast(30.0));
+            out.check("stabilised: late speed / first", late, Bound::AtMost(0.05));
+        }
+    }
+    out.tables.push(table);
+    out.figures.push(figure);
+    Ok(())
+}
