@@ -513,7 +513,7 @@ impl Default for Accuracy {
             cells: 32,
             particles_per_cell: 16,
             placement: Placement::Regular,
-            quadrature: Quadrature::Mixture,
+            quadrature: Quadrature::Laminate,
             integrator: Integrator::Extrapolated,
             stabilisation: 0.75,
             tolerance: 1e-12,
