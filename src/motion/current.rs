@@ -23,8 +23,7 @@
 //! smooth velocities keep their third order. The idea is that of Meyer and Jenny (2004) and of
 //! Wang, Agrusta and van Hunen (2015), who correct bilinear velocities.
 //!
-//! Measured on a lid-driven cell of 16 x 16 cells, 10,000 steps at a Courant number of 1/2, volumes
-//! not balanced: the rms error of the particles' volume in a cell grows to 3.9 without the
+//! Measured on a lid-driven cell of 16 x 16 cells, 10,000 steps at a Courant number of 1/2: the rms error of the particles' volume in a cell grows to 3.9 without the
 //! correction and stays at 0.24, that of particles placed at random, with it.
 
 use crate::space::shape::NODES;

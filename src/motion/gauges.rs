@@ -2,7 +2,6 @@
 //! velocity field.
 
 use crate::plan::Gauge;
-use crate::space::balance::Face;
 use crate::space::flow::Flow;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
@@ -46,18 +45,6 @@ impl Counter {
             if along >= g.from && along <= g.to {
                 self.volume += if b >= at { g.sign * volume } else { -g.sign * volume };
             }
-        }
-    }
-
-    /// Counts volume that passed between cells through a face.
-    pub fn exchange(&mut self, face: &Face, material: u8, volume: f64) {
-        let g = &self.gauge;
-        let on = face.normal == g.normal
-            && face.at.contains(&g.at)
-            && face.middle > g.from
-            && face.middle < g.to;
-        if on && material == g.material {
-            self.volume += g.sign * volume;
         }
     }
 

@@ -3,18 +3,14 @@
 //!
 //! In a cell that regions divide, the particles of each material stand for exactly its part: their
 //! volumes add up to its area, and they are shifted (by less than their spacing) so that their
-//! centroid is its centroid. A part that no particle happens to lie in gets one of its own. Carried
-//! densities are changed a little so that the cell's fit to them ([`crate::space::fit`]) is the
-//! fit to the field itself: at the start a level or a stratification has no noise of the
-//! particles' places.
+//! centroid is its centroid: at the start a level has no noise of the particles' places. A part
+//! that no particle happens to lie in gets one of its own.
 
 use super::sampling::{Filling, Sample, filling, samples};
 use crate::plan::{InitialDirector, Mark, Plan};
 use crate::scene::FieldFn;
-use crate::space::fit::{Degree, Fit};
 use crate::space::particles::Particles;
 use crate::space::population::{Count, Population};
-use crate::space::shape::GAUSS_5;
 use rand::Rng;
 use rand_pcg::Pcg64;
 
@@ -85,7 +81,7 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
                 column[last] = plan.marks.iter().any(|m| is_near(m, position));
             }
         }
-        carry(plan, cell, &samples, &members, (&mut out, first));
+        carry(plan, cell, &members, (&mut out, first));
     }
     out.sort(mesh);
     Ok(out)
@@ -187,13 +183,7 @@ fn lone(
 }
 
 /// Viscosities and densities that the particles of a cell carry.
-fn carry(
-    plan: &Plan,
-    cell: usize,
-    samples: &[Sample],
-    members: &[Member],
-    (out, first): (&mut Particles, usize),
-) {
+fn carry(plan: &Plan, cell: usize, members: &[Member], (out, first): (&mut Particles, usize)) {
     for (m, fields) in plan.initial.iter().enumerate() {
         let of_m = || (0..members.len()).filter(|&k| members[k].material as usize == m);
         let value = |f: &FieldFn, r: [f64; 2], unit: f64| {
@@ -205,26 +195,14 @@ fn carry(
                 column[first + k] = value(f, members[k].r, plan.units.viscosity);
             }
         }
-        let (Some(column), Some(f)) = (&mut out.density, &fields.density) else { continue };
-        let at = |r| value(f, r, plan.units.density);
-        let mut carried = Fit::default();
-        of_m().for_each(|k| carried.add(members[k].share, members[k].r, at(members[k].r)));
-        let Some(carried) = carried.solve(Degree::Quadratic) else { continue };
-        let mut field = Fit::default();
-        if samples.is_empty() {
-            for (y, wy) in GAUSS_5 {
-                GAUSS_5.iter().for_each(|(x, wx)| field.add(wx * wy, [*x, y], at([*x, y])));
+        if let (Some(column), Some(f)) = (&mut out.density, &fields.density) {
+            for k in of_m() {
+                column[first + k] = value(f, members[k].r, plan.units.density);
             }
-        }
-        let part = samples.iter().filter(|s| material(plan, s.filling) == Some(m as u8));
-        part.for_each(|s| field.add(s.share, s.r, at(s.r)));
-        let field = field.solve(carried.degree).unwrap_or(carried);
-        for k in of_m() {
-            let r = members[k].r;
-            column[first + k] = at(r) + field.at(r) - carried.at(r);
         }
     }
 }
+
 /// Angles spread evenly over `[-pi/2, pi/2)` in random order: `n` equal steps with an offset from
 /// a two-dimensional low-discrepancy sequence (Roberts 2018) over the cells, so that neighbouring
 /// cells fill each other's gaps. Each angle is uniformly distributed; means over few cells have

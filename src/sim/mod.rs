@@ -6,7 +6,6 @@
 //! move particles, dye          Runge-Kutta in the frozen field; walls hold, gauges count
 //! turn directors               exact map of the step's velocity gradient
 //! control the population       no cell empty or overfull
-//! balance volumes              a cell's particles fill it (incompressible scenes)
 //! integration points           local harmonic mixture of each cell's particles
 //! weight, restoring loads      density of each cell; stable strata ahead of time
 //! solve                        velocity, rotation, pressure
@@ -31,9 +30,8 @@ use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Loads, Report, SolveError, Stokes, Stopping};
 use crate::solve::weight::Weight;
-use crate::space::balance::{Balance, Face, open_faces};
 use crate::space::flow::Flow;
-use crate::space::neighbours::Neighbours;
+use crate::space::neighbours::{Face, Neighbours, open_faces};
 use crate::space::particles::Particles;
 use crate::space::population::{Count, Population};
 use clock::{Limiter, next_step};
@@ -114,7 +112,6 @@ pub struct Simulation<const D: usize> {
     version: u32,
     next_change: usize,
     population: Population,
-    balance: Balance,
     gauges: Vec<Counter>,
     dye: Option<DyeLines>,
     count: Count,
@@ -198,7 +195,6 @@ impl<const D: usize> Simulation<D> {
             version: 0,
             next_change: 0,
             population,
-            balance: Balance::new(&mesh, &plan.enclosure, plan.state.materials.len()),
             gauges: plan.gauges.iter().cloned().map(Counter::new).collect(),
             dye: plan.tracers.as_ref().map(DyeLines::new),
             count: Count::default(),
@@ -260,12 +256,6 @@ impl<const D: usize> Simulation<D> {
         seconds.motion += phase.elapsed().as_secs_f64();
         let phase = Instant::now();
         self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
-        if !plan.effects.volume_change {
-            let gauges = &mut self.gauges;
-            self.balance.even_out(&plan.mesh, &mut self.particles, |f, m, v| {
-                gauges.iter_mut().for_each(|g| g.exchange(f, m, v));
-            });
-        }
         seconds.population += phase.elapsed().as_secs_f64();
 
         self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };

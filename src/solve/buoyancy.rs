@@ -23,8 +23,8 @@
 //! jump and its place are exact. Faces have only nodes that cells share, so that the matrices of
 //! cells stay as they are.
 
-use crate::space::balance::Face;
 use crate::space::mesh::Mesh;
+use crate::space::neighbours::Face;
 
 /// Mass of the quadratic functions on a line, over its length.
 const LINE_MASS: [[f64; 3]; 3] = [

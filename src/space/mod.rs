@@ -1,6 +1,5 @@
 //! Where things are: mesh, shape functions, elimination order, boundary conditions, particles.
 
-pub mod balance;
 pub mod constraints;
 pub mod fit;
 pub mod flow;

@@ -49,6 +49,17 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
             ]);
             results.push((pairs, e.velocity));
         }
+        if let (Some(first), Some(last)) = (results.first(), results.last()) {
+            let share = last.1 / first.1;
+            out.check(
+                format!(
+                    "half waves {name}: difference at {} pairs over that at {}",
+                    last.0, first.0
+                ),
+                share,
+                Bound::AtMost(0.8),
+            );
+        }
         // Few thick layers are far from the limit.
         if let ([.., coarse, fine], Effort::Full) = (&results[..], effort) {
             out.check(

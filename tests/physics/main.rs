@@ -1,7 +1,6 @@
 //! What the physics demands: exact solutions, rates, invariants, symmetry.
 
 mod alignment;
-mod cases;
 mod dynamics;
 mod exact;
 mod laws;
@@ -9,6 +8,7 @@ mod order;
 mod patch;
 mod rest;
 mod steps;
+mod verification;
 
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse};
