@@ -227,20 +227,18 @@ impl Plan {
             0,
             &["gauges"],
         );
-        let plain = self.method.quadrature == Quadrature::Particles;
+        let rule = match self.method.quadrature {
+            Quadrature::Laminate => "\"laminate\": a laminate along the interface",
+            Quadrature::Mixture => "\"mixture\": a harmonic mixture",
+            Quadrature::Particles => "\"particles\": each particle by itself, as in the source",
+        };
         add(
-            "local harmonic mixture",
-            !plain,
+            "cut cells",
+            self.state.materials.len() > 1,
             why(
-                !plain,
-                match self.method.quadrature {
-                    Quadrature::Laminate => {
-                        "accuracy.quadrature = \"laminate\": the rest of cut cells"
-                    }
-                    _ => "accuracy.quadrature = \"mixture\"",
-                }
-                .into(),
-                "accuracy.quadrature = \"particles\"",
+                self.state.materials.len() > 1,
+                format!("several materials; accuracy.quadrature = {rule}"),
+                "one material",
             ),
             0,
             0,

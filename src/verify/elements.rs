@@ -59,14 +59,23 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     Ok(out)
 }
 
-/// The quantities of a case that have an expected rate.
-fn quantities(case: &Case) -> Vec<(&'static str, f64, fn(&Errors) -> f64)> {
+/// A quantity that has an expected rate.
+struct Quantity {
+    name: &'static str,
+    rate: f64,
+    of: fn(&Errors) -> f64,
+}
+
+fn quantities(case: &Case) -> Vec<Quantity> {
     let rates = &case.rates;
-    let mut out: Vec<(_, _, fn(&Errors) -> f64)> =
-        vec![("velocity", rates.velocity, |e| e.velocity)];
-    out.extend(rates.rotation.map(|r| ("rotation", r, (|e| e.rotation) as fn(&Errors) -> f64)));
-    out.extend(rates.pressure.map(|r| ("pressure", r, (|e| e.pressure) as fn(&Errors) -> f64)));
-    out
+    let all: [(_, _, fn(&Errors) -> f64); 3] = [
+        ("velocity", Some(rates.velocity), |e| e.velocity),
+        ("rotation", rates.rotation, |e| e.rotation),
+        ("pressure", rates.pressure, |e| e.pressure),
+    ];
+    all.into_iter()
+        .filter_map(|(name, rate, of)| Some(Quantity { name, rate: rate?, of }))
+        .collect()
 }
 
 fn tabulate(case: &Case, results: &[(u32, Errors)], table: &mut Table) {
@@ -74,8 +83,8 @@ fn tabulate(case: &Case, results: &[(u32, Errors)], table: &mut Table) {
     for (k, (n, errors)) in results.iter().enumerate() {
         let mut row = vec![case.name.clone(), n.to_string()];
         for name in ["velocity", "rotation", "pressure"] {
-            match known.iter().find(|q| q.0 == name) {
-                Some((_, _, get)) => {
+            match known.iter().find(|q| q.name == name) {
+                Some(Quantity { of: get, .. }) => {
                     row.push(number(get(errors)));
                     row.push(if k == 0 {
                         String::new()
@@ -93,7 +102,7 @@ fn tabulate(case: &Case, results: &[(u32, Errors)], table: &mut Table) {
 
 /// Every rate between neighbouring resolutions, unless rounding has been reached.
 fn check(case: &Case, results: &[(u32, Errors)], out: &mut Section) {
-    for (name, expected, get) in quantities(case) {
+    for Quantity { name, rate: expected, of: get } in quantities(case) {
         let rates = results
             .windows(2)
             .filter(|w| get(&w[1].1) > 1e-10)

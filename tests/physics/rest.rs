@@ -34,11 +34,9 @@ fn speed(gravity: &str, cells: u32, placement: &str, rest: &str) -> f64 {
 fn stratified_fluids_hardly_move() {
     // A linear density is fitted exactly from any places; another leaves the noise of what a
     // quadratic cannot follow, which falls at third order and faster.
-    for (density, at_32) in [
-        ("1000*(1-y)", 1e-12),
-        ("1000*exp(-3*y)", 1e-7),
-        ("500*(1-tanh((y-0.5)/0.2))", 1e-6),
-    ] {
+    for (density, at_32) in
+        [("1000*(1-y)", 1e-12), ("1000*exp(-3*y)", 1e-7), ("500*(1-tanh((y-0.5)/0.2))", 1e-6)]
+    {
         for viscosity in ["100", "100*exp(-6.9*y)"] {
             for placement in PLACEMENTS {
                 let material = format!(
@@ -49,7 +47,10 @@ fn stratified_fluids_hardly_move() {
                 println!("{density}, {viscosity}, {placement}: {coarse:e} {fine:e}");
                 assert!(fine < at_32, "{density}, {viscosity}, {placement}: {fine:e}");
                 let order = (coarse / fine).log2();
-                assert!(fine < 1e-12 || order > 2.0, "{density}, {viscosity}, {placement}: {order}");
+                assert!(
+                    fine < 1e-12 || order > 2.0,
+                    "{density}, {viscosity}, {placement}: {order}"
+                );
             }
         }
     }
