@@ -63,12 +63,14 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
 struct Quantity {
     name: &'static str,
     rate: f64,
-    of: fn(&Errors) -> f64,
+    of: ErrorOf,
 }
+
+type ErrorOf = fn(&Errors) -> f64;
 
 fn quantities(case: &Case) -> Vec<Quantity> {
     let rates = &case.rates;
-    let all: [(_, _, fn(&Errors) -> f64); 3] = [
+    let all: [(_, _, ErrorOf); 3] = [
         ("velocity", Some(rates.velocity), |e| e.velocity),
         ("rotation", rates.rotation, |e| e.rotation),
         ("pressure", rates.pressure, |e| e.pressure),
