@@ -7,7 +7,7 @@
 //! particles' places, so its element matrix is a constant.
 //!
 //! **Laminate**. The same, but in cells that hold two materials the viscous stiffness is that of
-//! [`laminate`](super::laminate), with the interface that [`interface`](super::interface) finds.
+//! [`laminate`], with the interface that [`interface`](super::interface) finds.
 //! Where it finds none to trust (drops below a cell, three materials) the mixture stays. Rotation,
 //! density and pictures are those of the mixture.
 //!

@@ -6,7 +6,10 @@ use crate::cases::{
     Case, CaseError, Drive, Inclined, Small, SolCx, inclined_pure_shear, inclined_shear, solcx,
     solvi,
 };
-use crate::sim::SimError;
+use crate::plan::resolve;
+use crate::scene::{SceneSource, parse};
+use crate::sim::{self, SimError};
+use std::sync::Arc;
 
 /// The rule the table compares everything with.
 const DEFAULT: &str = "laminate";
@@ -93,6 +96,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     out.tables.push(table);
     out.figures.push(figure);
     small_inclusions(effort, &mut out)?;
+    drops(effort, &mut out)?;
     Ok(out)
 }
 
@@ -145,6 +149,53 @@ fn small_inclusions(effort: Effort, out: &mut Section) -> Result<(), CaseError> 
             }
         }
         table.rows.push(row);
+    }
+    out.tables.push(table);
+    Ok(())
+}
+
+/// A drop that falls, its rim inside cells; its speed.
+fn fall(drop: &str, around: &str, cells: u32, rule: &str) -> Result<f64, CaseError> {
+    let text = format!(
+        "schema = 1\nname = \"drop\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
+         [accuracy]\ncells = {cells}\nplacement = \"jittered\"\nquadrature = \"{rule}\"\n[time]\n\
+         end = 1\n[materials.drop]\ndensity = 1\nshear_viscosity = 1\n{drop}\n[materials.rest]\n\
+         shear_viscosity = {around}\n[[regions]]\nmaterial = \"rest\"\n[[regions]]\n\
+         material = \"drop\"\ndirector.angle_degrees = 30\n\
+         shape.circle = {{ centre = [0.37, 0.55], radius = 0.23 }}\n"
+    );
+    let source = SceneSource::new("drop", text);
+    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
+    Ok(sim::start(Arc::new(plan))?.row().max_speed)
+}
+
+fn drops(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
+    let mut header = vec!["drop", "viscosity around"];
+    header.extend(RULES);
+    let mut table = Table::new(
+        "Falling drops of Cosserat and of layered fluid in a fluid of other viscosity: largest speed \
+         at 16 cells over that at 64 cells with the default rule.",
+        &header,
+    );
+    let cosserat = "coupling_viscosity = 1\ninternal_length = 0.25";
+    let layered = "layer_viscosity = 0.1";
+    for (name, drop) in effort.take(&[("Cosserat", cosserat), ("layered", layered)]) {
+        for around in effort.take(&["1e-3", "0.1", "1", "1e3"]) {
+            let fine = fall(drop, around, 64, DEFAULT)?;
+            let mut row = vec![name.to_string(), around.to_string()];
+            for rule in RULES {
+                let ratio = fall(drop, around, 16, rule)? / fine;
+                row.push(format!("{ratio:.3}"));
+                if rule == DEFAULT {
+                    out.check(
+                        format!("{name} drop in {around}: speed at 16 cells over that at 64"),
+                        ratio,
+                        Bound::Within(1.0, 0.03),
+                    );
+                }
+            }
+            table.rows.push(row);
+        }
     }
     out.tables.push(table);
     Ok(())
