@@ -6,7 +6,7 @@
 //! move particles, dye          Runge-Kutta in the frozen field; walls hold, gauges count
 //! turn directors               exact map of the step's velocity gradient
 //! control the population       no cell empty or overfull
-//! integration points           local harmonic mixture of each cell's particles
+//! integration points           what each cell's particles say: shares, interface, fields
 //! weight, restoring loads      density of each cell; stable strata ahead of time
 //! solve                        velocity, rotation, pressure
 //! ```

@@ -13,7 +13,10 @@
 //! The direction of the interface is the largest eigenvector of `sum delta(f) n n^T`, and the
 //! difference of the eigenvalues tells how much of a direction it has: one for an edge or a sheet,
 //! nothing for a drop.
+//!
+//! Stiff sheets below a cell are told by [`minority`](super::minority) and have straight rims.
 
+use super::minority::{Labelled, Strip};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_6X6, SUBPOINTS};
@@ -26,6 +29,8 @@ const NEWTON_STEPS: usize = 6;
 const CERTAIN: f64 = 9.0;
 /// Width of the ramp from one material to the other, in cells: the spacing of the points.
 const RAMP: f64 = 1.0 / 6.0;
+/// The same of a sheet's rims: points are farther apart than a ramp in the middle of the cell.
+const SHEET_RAMP: f64 = 0.3;
 /// Points within this distance (cells) of the interface have a say in its direction.
 const NEAR: f64 = 0.25;
 /// Coherence below which there is no direction, and from which on it is certain.
@@ -33,6 +38,8 @@ const COHERENCE: [f64; 2] = [0.3, 0.7];
 /// Difference to the cell's own share of particles: up to which it is noise, and from which on
 /// the level set is not what the cell holds (two sheets, debris).
 const MISFIT: [f64; 2] = [0.1, 0.2];
+/// Of a sheet, of which a cell may hold few particles.
+const SHEET_MISFIT: [f64; 2] = [0.25, 0.5];
 
 /// The interface in one cell.
 #[derive(Clone, Debug)]
@@ -41,8 +48,32 @@ pub struct Interface {
     pub share: [f64; SUBPOINTS],
     /// Unit normal, either way.
     pub normal: [f64; 2],
+    /// Whether it is that of a stiff sheet below a cell, whose tension is real.
+    pub sheet: bool,
     /// 0: there is no such interface, 1: there certainly is.
     pub trust: f64,
+}
+
+impl Interface {
+    /// The rims of a sheet, whose material is the second one or not and has the share `wanted` of
+    /// the cell.
+    pub fn of_sheet(strip: &Strip, second: bool, [hx, hy]: [f64; 2], wanted: f64) -> Self {
+        let mut inside =
+            GAUSS_6X6.each_ref().map(|g| strip.share([0.5 * g.r[0], 0.5 * g.r[1]], SHEET_RAMP));
+        // The points are too few for a thin strip: its area is right anyway.
+        let found: f64 = GAUSS_6X6.iter().zip(inside).map(|(g, s)| g.weight * s).sum();
+        let area = strip.area(SHEET_RAMP);
+        if found > 0.0 {
+            inside.iter_mut().for_each(|s| *s = (*s * area / found).min(1.0));
+        }
+        let held = if second { area } else { 1.0 - area };
+        let share = inside.map(|s| if second { s } else { 1.0 - s });
+        let (nx, ny) = (strip.normal[0] / hx, strip.normal[1] / hy);
+        let length = nx.hypot(ny);
+        let normal = [nx / length, ny / length];
+        let trust = fade((held - wanted).abs(), SHEET_MISFIT);
+        Interface { share, normal, sheet: true, trust }
+    }
 }
 
 /// `a, g_x, g_y, H_xx, H_xy, H_yy`
@@ -60,26 +91,27 @@ fn value(f: &[f64; 6], x: &[f64; 6]) -> f64 {
 /// Room for the particles around a cell, kept from cell to cell.
 #[derive(Default)]
 pub struct Surroundings {
-    particles: Vec<([f64; 6], bool)>,
+    particles: Vec<Labelled>,
+    size: [f64; 2],
 }
 
 impl Surroundings {
-    /// The interface between two materials, of which the second has the share `wanted` of the
-    /// cell. `None` if the regression fails.
-    pub fn interface(
-        &mut self,
-        mesh: &Mesh,
-        particles: &Particles,
-        cell: usize,
-        between: [usize; 2],
-        wanted: f64,
-    ) -> Option<Interface> {
-        self.gather(mesh, particles, cell, between);
-        let f = self.regress()?;
-        Some(describe(&f, mesh.cell_size(cell), wanted))
+    /// Around the last gathered cell, from its centre in cell sizes.
+    pub fn particles(&self) -> &[Labelled] {
+        &self.particles
     }
 
-    fn gather(&mut self, mesh: &Mesh, particles: &Particles, cell: usize, [a, b]: [usize; 2]) {
+    /// The interface in the gathered cell, of which the second material has the share `wanted`.
+    /// `None` if the regression fails.
+    pub fn interface(&self, wanted: f64) -> Option<Interface> {
+        let f = self.regress()?;
+        Some(describe(&f, self.size, wanted))
+    }
+
+    /// Takes up the particles of two materials in a cell and around it.
+    pub fn gather(&mut self, mesh: &Mesh, particles: &Particles, cell: usize, between: [usize; 2]) {
+        let [a, b] = between;
+        self.size = mesh.cell_size(cell);
         self.particles.clear();
         let [cx, cy] = mesh.cell_centre(cell);
         let [hx, hy] = mesh.cell_size(cell);
@@ -109,7 +141,7 @@ impl Surroundings {
                 }
                 let [x, y] = particles.position[p];
                 let at = [nearest(x - cx, lx) / hx, nearest(y - cy, ly) / hy];
-                self.particles.push((basis(at), m == b));
+                self.particles.push((at, m == b));
             }
         }
     }
@@ -121,8 +153,9 @@ impl Surroundings {
             let mut gradient: Coefficients = f.map(|f| -RIDGE * f);
             gradient[0] = 0.0;
             let mut hessian = [[0.0; 6]; 6];
-            for (x, second) in &self.particles {
-                let value = value(&f, x);
+            for (at, second) in &self.particles {
+                let x = basis(*at);
+                let value = value(&f, &x);
                 if value.abs() > CERTAIN && (value > 0.0) == *second {
                     continue;
                 }
@@ -177,7 +210,8 @@ fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
     let angle = 0.5 * xy.atan2(0.5 * (xx - yy));
     let directed = 1.0 - fade(coherence, COHERENCE);
     let normal = [angle.cos(), angle.sin()];
-    Interface { share, normal, trust: directed * fade((held - wanted).abs(), MISFIT) }
+    let trust = directed * fade((held - wanted).abs(), MISFIT);
+    Interface { share, normal, sheet: false, trust }
 }
 
 #[cfg(test)]
@@ -210,14 +244,9 @@ mod tests {
                 second([(k % 100) as f64 / 100.0 - 0.495, (k / 100) as f64 / 100.0 - 0.495])
             })
             .count();
-        let found = Surroundings::default().interface(
-            &mesh,
-            &particles,
-            CENTRE,
-            [0, 1],
-            held as f64 / 16.0,
-        );
-        (found.unwrap(), fine as f64 / 1e4)
+        let mut around = Surroundings::default();
+        around.gather(&mesh, &particles, CENTRE, [0, 1]);
+        (around.interface(held as f64 / 16.0).unwrap(), fine as f64 / 1e4)
     }
 
     fn area(i: &Interface) -> f64 {

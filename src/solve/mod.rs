@@ -6,6 +6,7 @@ pub mod cholesky;
 pub mod element;
 pub mod interface;
 pub mod laminate;
+pub mod minority;
 pub mod quadrature;
 pub mod stokes;
 pub mod weight;

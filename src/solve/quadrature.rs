@@ -1,14 +1,16 @@
 //! From particles to integration points.
 //!
-//! **Mixture** (default). Gauss points of every cell see the materials of the cell's own
+//! **Mixture**. Gauss points of every cell see the materials of the cell's own
 //! particles. The fraction of material `m` at Gauss point `g` is the particle volume near it,
 //! weighted by `exp(-r^2 / (0.4 h)^2)`; each material has its own law there, and the laws mix as
 //! [`Mixture`] says. A cell of one uniform material sees that law exactly, whatever its
 //! particles' places, so its element matrix is a constant.
 //!
-//! **Laminate**. The same, but in cells that hold two materials the viscous stiffness is that of
+//! **Laminate** (default). The same, but in cells that hold two materials the viscous stiffness is that of
 //! [`laminate`], with the interface that [`interface`](super::interface) finds.
-//! Where it finds none to trust (drops below a cell, three materials) the mixture stays. Rotation,
+//! Where it finds none to trust (three materials, debris) the mixture stays. Sheets and drops below
+//! a cell are told by [`minority`]: a stiff sheet is a laminate
+//! with straight rims, and a drop makes its cells a dilute suspension. Rotation,
 //! density and pictures are those of the mixture.
 //!
 //! **Particles**. Each particle is an integration point with its own law and a weight
@@ -16,6 +18,7 @@
 
 use super::interface::{Interface, Surroundings};
 use super::laminate::{self, Cut, VelocityMatrix};
+use super::minority;
 use crate::laws::point::{Mixture, PointLaw};
 use crate::plan::material::{Material, Texture};
 use crate::scene::Quadrature as Rule;
@@ -306,19 +309,27 @@ impl Quadrature {
                 let points = &mut self.points[9 * cell..9 * cell + 9];
                 let fractions = &mut self.fractions[cell * self.materials..][..self.materials];
                 scratch.gather(mesh, cell, particles, materials);
+                let form = match self.rule {
+                    Rule::Laminate => scratch.form(mesh, cell, particles, materials),
+                    Rule::Mixture | Rule::Particles => Form::Mixture,
+                };
+                let mixture = match form {
+                    Form::Drops { around } => Mixture::around_drops(around),
+                    Form::Cut { .. } | Form::Mixture => Mixture::default(),
+                };
                 let (viscosity, compliance) =
-                    scratch.evaluate(points, fractions, materials, &self.factors);
+                    scratch.evaluate(points, fractions, materials, &self.factors, mixture);
                 self.mean_viscosity[cell] = viscosity;
                 self.compliance[cell] = compliance;
-                if self.rule == Rule::Laminate {
-                    self.cut[cell] = scratch.laminate(mesh, cell, particles, materials);
-                    if let Some(cut) = &self.cut[cell] {
-                        // In parallel: the stiff part counts. With the mixture's mean as the
-                        // scale of the penalty layers of contrast 1e8 do not converge.
-                        let arithmetic = scratch.arithmetic_viscosity(materials);
-                        self.mean_viscosity[cell] =
-                            cut.rest * viscosity + (1.0 - cut.rest) * arithmetic;
-                    }
+                if let Form::Cut { interface, between } = form {
+                    let size = mesh.cell_size(cell);
+                    let cut = scratch.laminate(size, &interface, between, materials);
+                    // In parallel: the stiff part counts. With the mixture's mean as the
+                    // scale of the penalty layers of contrast 1e8 do not converge.
+                    let arithmetic = scratch.arithmetic_viscosity(materials);
+                    self.mean_viscosity[cell] =
+                        cut.rest * viscosity + (1.0 - cut.rest) * arithmetic;
+                    self.cut[cell] = Some(Box::new(cut));
                 }
             }
             Content::Solid | Content::Unknown => {}
@@ -420,6 +431,16 @@ fn content(
     })
 }
 
+/// How the materials of a cell lie.
+enum Form {
+    /// Two with an interface.
+    Cut { interface: Interface, between: [usize; 2] },
+    /// Drops in a material of the viscosity `around`.
+    Drops { around: f64 },
+    /// Unknown.
+    Mixture,
+}
+
 /// Sums over the particles of one cell, by Gauss point and material.
 struct Scratch {
     /// Kernel-weighted volume, index `9 m + g`.
@@ -513,33 +534,64 @@ impl Scratch {
         }
     }
 
-    /// Stiffness of a cell of two materials whose interface can be told.
-    fn laminate(
+    /// What two materials form in a gathered cell.
+    fn form(
         &mut self,
         mesh: &Mesh,
         cell: usize,
         particles: &Particles,
         materials: &[Material],
-    ) -> Option<Box<CutStiffness>> {
+    ) -> Form {
         let mut present = (0..materials.len()).filter(|&m| self.volume[m] > 0.0);
-        let between = [present.next()?, present.next()?];
-        if present.next().is_some() {
-            return None;
-        }
+        let (Some(first), Some(second), None) = (present.next(), present.next(), present.next())
+        else {
+            return Form::Mixture;
+        };
+        let between = [first, second];
         let [a, b] = between.map(|m| self.volume[m]);
-        let interface = self.surroundings.interface(mesh, particles, cell, between, b / (a + b))?;
-        if interface.trust == 0.0 {
-            return None;
+        let share = b / (a + b);
+        let viscosity = between.map(|m| self.viscosity_in_cell(m, &materials[m]));
+        self.surroundings.gather(mesh, particles, cell, between);
+        let around = self.surroundings.particles();
+        for drop in [false, true] {
+            if minority::is_drop(around, drop) {
+                return Form::Drops { around: viscosity[usize::from(!drop)] };
+            }
         }
+        let stiff = viscosity[1] > viscosity[0];
+        if let Some(strip) = minority::sheet(around, stiff) {
+            let interface = Interface::of_sheet(&strip, stiff, mesh.cell_size(cell), share);
+            if interface.trust > 0.0 {
+                return Form::Cut { interface, between };
+            }
+        }
+        match self.surroundings.interface(share) {
+            Some(interface) if interface.trust > 0.0 => Form::Cut { interface, between },
+            _ => Form::Mixture,
+        }
+    }
+
+    /// Stiffness of a cell of two materials with an interface.
+    fn laminate(
+        &self,
+        size: [f64; 2],
+        interface: &Interface,
+        between: [usize; 2],
+        materials: &[Material],
+    ) -> CutStiffness {
         let sides = between.map(|m| self.law_in_cell(m, &materials[m]));
-        let mut matrix = laminate::matrix(&Cut {
-            interface: &interface,
-            sides: &sides,
-            size: mesh.cell_size(cell),
-        });
-        let Interface { trust, .. } = interface;
-        matrix.iter_mut().flatten().for_each(|k| *k *= trust);
-        Some(Box::new(CutStiffness { matrix, rest: 1.0 - trust }))
+        let mut matrix = laminate::matrix(&Cut { interface, sides: &sides, size });
+        matrix.iter_mut().flatten().for_each(|k| *k *= interface.trust);
+        CutStiffness { matrix, rest: 1.0 - interface.trust }
+    }
+
+    /// Mean viscosity of one material's law in the cell's middle.
+    fn viscosity_in_cell(&self, m: usize, material: &Material) -> f64 {
+        let eta = match self.log_viscosity[m].solve(Degree::Quadratic) {
+            Some(fit) if material.carries_viscosity => fit.at_bounded([0.0; 2]).exp(),
+            _ => material.viscosity,
+        };
+        material.law(eta, &self.cell_texture[m]).shear.mean()
     }
 
     /// Mean viscosity of the cell's materials by volume.
@@ -566,6 +618,7 @@ impl Scratch {
         fractions: &mut [f64],
         materials: &[Material],
         factors: &[f64],
+        empty: Mixture,
     ) -> (f64, f64) {
         let viscosity_fit: Vec<_> =
             self.log_viscosity.iter().map(|f| f.solve(Degree::Quadratic)).collect();
@@ -573,7 +626,7 @@ impl Scratch {
         fractions.fill(0.0);
         let (mut mean_viscosity, mut compliance) = (0.0, 0.0);
         for (g, point) in points.iter_mut().enumerate() {
-            let mut mixture = Mixture::default();
+            let mut mixture = empty;
             for (m, material) in materials.iter().enumerate() {
                 let phi = self.weight[9 * m + g];
                 if phi == 0.0 {
