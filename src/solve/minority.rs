@@ -129,12 +129,16 @@ pub fn sheet(particles: &[Labelled], second: bool) -> Option<Strip> {
     }
     let mut along: Vec<f64> = of(second).map(|p| m.coordinates(p)[0]).collect();
     along.sort_by(f64::total_cmp);
-    let length = along.last()? - along.first()?;
-    if length < SHORTEST || along.windows(2).any(|w| w[1] - w[0] > GAP) {
+    let (first, last) = (*along.first()?, *along.last()?);
+    if last - first < SHORTEST || along.windows(2).any(|w| w[1] - w[0] > GAP) {
         return None;
     }
+    // Beside the strip, not beyond its ends, where a corner has the other material too.
     let beyond = 0.5 * width + 0.1;
-    let flank = |side: f64| of(!second).filter(|&p| side * m.coordinates(p)[1] > beyond).count();
+    let flank = |side: f64| {
+        let beside = |[s, d]: [f64; 2]| side * d > beyond && first < s && s < last;
+        of(!second).filter(|&p| beside(m.coordinates(p))).count()
+    };
     if flank(1.0) < FLANK || flank(-1.0) < FLANK {
         return None;
     }
