@@ -24,7 +24,7 @@ pub fn all() -> Result<Vec<Trial>, CaseError> {
 }
 
 /// A trial of a scene text; long ones are left out of the quick battery by [`Trial::long`].
-fn trial(group: &'static str, name: impl Into<String>, text: String, steps: u64) -> Trial {
+pub(super) fn trial(group: &'static str, name: impl Into<String>, text: String, steps: u64) -> Trial {
     let name = name.into();
     Trial {
         group,
@@ -48,7 +48,7 @@ impl Trial {
         self
     }
 
-    fn expecting(
+    pub(super) fn expecting(
         mut self,
         f: impl Fn(&dyn Run) -> Result<Vec<Check>, CaseError> + Send + Sync + 'static,
     ) -> Self {
