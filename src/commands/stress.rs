@@ -30,7 +30,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let filters: Vec<String> = args.filters.iter().map(|f| f.to_lowercase()).collect();
     let wanted = |t: &Trial| {
         let title = format!("{}: {}", t.group, t.name).to_lowercase();
-        (t.quick || !args.quick) && (filters.is_empty() || filters.iter().any(|f| title.contains(f)))
+        (t.quick || !args.quick)
+            && (filters.is_empty() || filters.iter().any(|f| title.contains(f)))
     };
     let trials: Vec<Trial> = stress::all()?.into_iter().filter(wanted).collect();
     if trials.is_empty() {

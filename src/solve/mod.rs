@@ -7,5 +7,6 @@ pub mod element;
 pub mod interface;
 pub mod laminate;
 pub mod quadrature;
+pub mod spin;
 pub mod stokes;
 pub mod weight;

@@ -27,8 +27,9 @@ pub struct Criteria {
     pub divergence: f64,
     /// Corrections of a step, all its solutions together.
     pub corrections: f64,
-    /// Root mean square over the cells of (volume of particles)/(area) - 1, incompressible scenes.
-    pub volume_error: f64,
+    /// Share of the volume that lies in the wrong cell (sum of |volume of particles - area|), over
+    /// that of a row of particles in a cell; incompressible scenes.
+    pub misplaced: f64,
     /// Relative change of a material's projected area.
     pub drift: f64,
     /// Relative change of the volume of all particles of a closed, incompressible scene.
@@ -37,10 +38,11 @@ pub struct Criteria {
     pub director: f64,
     /// Particles out of the domain or inside a solid.
     pub outside: f64,
-    /// Largest speed over that of the first instant, or over the scene's own unit of speed where
-    /// that is larger.
+    /// Largest speed over that of the first instant, or over a thousandth of the scene's own unit
+    /// of speed where that is larger.
     pub growth: f64,
-    /// Farthest that a carried viscosity or density goes beyond its first extrema, relative.
+    /// Farthest that a carried viscosity or density goes beyond its first extrema, relative to the
+    /// larger; incompressible scenes.
     pub extrema: f64,
     /// A trial passes this factor inside its bounds; nearer than that its margin is told.
     pub margin: f64,
@@ -51,13 +53,13 @@ pub const CRITERIA: Criteria = Criteria {
     power: 1e-7,
     divergence: 1e-9,
     corrections: 40.0,
-    volume_error: 0.1,
+    misplaced: 1.0,
     drift: 0.03,
-    volume: 1e-12,
+    volume: 1e-10,
     director: 1e-12,
     outside: 0.0,
     growth: 20.0,
-    extrema: 1e-12,
+    extrema: 0.05,
     margin: 2.0,
 };
 
@@ -124,10 +126,8 @@ pub fn judge(checks: &[Check]) -> (Verdict, Option<Check>) {
         let reason = format!("{} is {:.2e}, must be {}", c.what, c.value, c.bound);
         return (Verdict::Fail(reason), Some(c.clone()));
     }
-    let tightest = checks
-        .iter()
-        .filter_map(|c| Some((margin(c)?, c)))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let tightest =
+        checks.iter().filter_map(|c| Some((margin(c)?, c))).min_by(|a, b| a.0.total_cmp(&b.0));
     match tightest {
         Some((m, c)) if m < CRITERIA.margin => (Verdict::Margin(m), Some(c.clone())),
         other => (Verdict::Pass, other.map(|(_, c)| c.clone())),
@@ -157,7 +157,10 @@ mod tests {
         assert_eq!(verdict, Verdict::Margin(1.5));
         assert_eq!(tightest.expect("one").value, 1.0);
         assert_eq!(judge(&[check(0.1, 1.0)]).0, Verdict::Pass);
-        assert_eq!(judge(&[Check::new("it", 1.1, Bound::Within(1.0, 0.15))]).0.to_string(), "margin 1.5");
+        assert_eq!(
+            judge(&[Check::new("it", 1.1, Bound::Within(1.0, 0.15))]).0.to_string(),
+            "margin 1.5"
+        );
         assert!(judge(&[check(0.1, 1.0), check(f64::NAN, 1.0)]).0.is_failure());
         assert!(judge(&[check(1.0, 0.0)]).0.is_failure());
     }

@@ -31,12 +31,16 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
         ("power balance", c.power, "relative difference of the power of loads and dissipation"),
         ("divergence", c.divergence, "L2 norm, relative to the strain rate"),
         ("corrections", c.corrections, "a step of the solver, all its solutions together"),
-        ("volume of cells", c.volume_error, "rms of particles' volume over a cell's area, less 1"),
+        ("volume of cells", c.misplaced, "share in the wrong cell, over a row of particles of one"),
         ("drift of projected area", c.drift, "relative change of a material's area on the mesh"),
         ("volume of particles", c.volume, "relative change, where none leave"),
         ("length of directors", c.director, "distance from 1"),
         ("particles outside", c.outside, "the domain, or inside a wall"),
-        ("growth of speed", c.growth, "largest speed over the first or the scene's own unit"),
+        (
+            "growth of speed",
+            c.growth,
+            "largest speed over the first, or over 1e-3 of the scene's own",
+        ),
         ("carried values", c.extrema, "how far viscosities and densities leave their first range"),
     ] {
         criteria.rows.push(vec![what.into(), number(most), of.into()]);

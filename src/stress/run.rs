@@ -12,6 +12,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+/// Speeds below this share of a scene's own unit are rest.
+const LEAST_SPEED: f64 = 1e-3;
+
 /// The first instant, which later ones are compared with.
 struct First {
     volume: f64,
@@ -31,7 +34,7 @@ impl First {
         let p = run.particles();
         First {
             volume: p.volume.iter().sum(),
-            speed: run.row().max_speed.max(run.plan().units.velocity()),
+            speed: run.row().max_speed.max(LEAST_SPEED * run.plan().units.velocity()),
             extrema: [range(&p.viscosity), range(&p.density)],
         }
     }
@@ -43,7 +46,7 @@ struct Worst {
     power: f64,
     divergence: f64,
     corrections: f64,
-    volume_error: f64,
+    misplaced: f64,
     drift: f64,
     volume: f64,
     director: f64,
@@ -69,13 +72,16 @@ impl Worst {
         row.drift.iter().for_each(|d| raise(&mut self.drift, d.abs()));
         raise(&mut self.growth, row.max_speed / first.speed);
         if !plan.effects.volume_change {
-            raise(&mut self.volume_error, row.volume_error);
+            raise(&mut self.misplaced, misplaced_volume(run));
             if run.count().left == 0 {
                 let volume: f64 = particles.volume.iter().sum();
                 raise(&mut self.volume, (volume / first.volume - 1.0).abs());
             }
         }
         raise(&mut self.outside, misplaced(run) as f64);
+        if plan.effects.volume_change {
+            return;
+        }
         let now = [range(&particles.viscosity), range(&particles.density)];
         for (now, first) in now.into_iter().zip(first.extrema) {
             if let (Some(now), Some(first)) = (now, first) {
@@ -91,7 +97,7 @@ impl Worst {
             ("power balance", self.power, c.power),
             ("divergence", self.divergence, c.divergence),
             ("corrections", self.corrections, c.corrections),
-            ("volume of cells", self.volume_error, c.volume_error),
+            ("volume of cells", self.misplaced, c.misplaced),
             ("volume of particles", self.volume, c.volume),
             ("length of directors", self.director, c.director),
             ("particles outside", self.outside, c.outside),
@@ -103,6 +109,18 @@ impl Worst {
         }
         out.into_iter().map(|(what, v, most)| Check::new(what, v, Bound::AtMost(most))).collect()
     }
+}
+
+/// Share of the volume that lies in the wrong cell, over that of a row of particles in a cell.
+fn misplaced_volume(run: &dyn Run) -> f64 {
+    let (mesh, particles) = (&run.plan().mesh, run.particles());
+    let (mut wrong, mut all) = (0.0, 0.0);
+    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let volume: f64 = particles.of_cell(cell).map(|p| particles.volume[p]).sum();
+        wrong += (volume - mesh.cell_area(cell)).abs();
+        all += mesh.cell_area(cell);
+    }
+    wrong / all * run.plan().method.seeding.side as f64
 }
 
 /// Particles out of the domain, inside a solid, or nowhere.
