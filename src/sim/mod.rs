@@ -91,6 +91,9 @@ impl SimError {
     }
 }
 
+/// A step is taken again, shorter, if its middle crosses this many times the cells it may.
+const SURPRISE: f64 = 4.0;
+
 /// A run at one instant. `D` is 2, or 3 with Cosserat rotation; see [`start`] for the choice.
 pub struct Simulation<const D: usize> {
     plan: Arc<Plan>,
@@ -233,13 +236,24 @@ impl<const D: usize> Simulation<D> {
         let clock = Instant::now();
         let mut seconds = Phases::default();
         let speeds = self.speeds();
-        let (dt, limiter) =
+        let (mut dt, mut limiter) =
             next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.1), speeds);
-        if dt.is_nan() || self.time + dt <= self.time {
-            let dt = dt * self.plan.units.time;
-            return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
-        }
-        let (half, extra) = self.half_step_velocity(dt, &mut seconds)?;
+        let mut extra = 0;
+        let half = loop {
+            if dt.is_nan() || self.time + dt <= self.time {
+                let dt = dt * self.plan.units.time;
+                return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
+            }
+            let (half, corrections) = self.half_step_velocity(dt, &mut seconds)?;
+            extra += corrections;
+            // A flow that has hardly begun says nothing about its own middle of the step.
+            let crossed = dt * self.crossings(|node| half[node]);
+            let most = self.plan.clock.courant;
+            if crossed <= SURPRISE * most {
+                break half;
+            }
+            (dt, limiter) = (dt * (most / crossed), Limiter::Courant);
+        };
 
         let phase = Instant::now();
         let plan = self.plan.clone();
@@ -289,11 +303,11 @@ impl<const D: usize> Simulation<D> {
     }
 
     /// Parts in which points go through a velocity frozen for `dt`: one as long as none crosses
-    /// more than a cell, for longer ways would crowd and thin out what a flow without divergence
-    /// keeps apart.
+    /// more than a cell, else parts of half a cell, for longer ways would crowd and thin out what a
+    /// flow without divergence keeps apart.
     fn parts(&self, velocity: &[[f64; 2]], dt: f64) -> u32 {
         let crossed = dt * self.crossings(|node| velocity[node]);
-        if crossed > 1.0 { crossed.ceil().min(1e4) as u32 } else { 1 }
+        if crossed > 1.0 { (2.0 * crossed).ceil().min(1e4) as u32 } else { 1 }
     }
 
     fn si_time(&self) -> f64 {
@@ -442,10 +456,11 @@ impl<const D: usize> Simulation<D> {
                     Integrator::Euler => vec![[0.0; 2]; before.len()],
                     Integrator::Extrapolated | Integrator::Midpoint => before,
                 };
-                let means = self.weight.means();
+                let (means, slopes) = (self.weight.means(), self.weight.slopes());
                 let load = (self.matter.gravity, ahead);
                 let mesh = &self.plan.mesh;
-                self.restoring.update(mesh, &self.restoring_faces, &means, load, before);
+                let density = (means.as_slice(), slopes.as_slice());
+                self.restoring.update(mesh, &self.restoring_faces, density, load, before);
             }
             None => self.restoring.clear(),
         }

@@ -47,9 +47,10 @@ const PENALTY: f64 = 1e4;
 /// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
 const RIGID_SHARE: f64 = 1e-3;
 
-/// Share of the pressure's forces in the scale of the residual: at the usual tolerance a few units
-/// in the last place of forces that cancel between cells.
-const PRESSURE_SHARE: f64 = 1e-3;
+/// Share of the pressure's forces in the scale of the residual, and of what the penalty makes of
+/// the pressure in that of the divergence: at the usual tolerance a unit or two in the last place of
+/// a pressure that is far larger than the stresses of the flow.
+const PRESSURE_SHARE: f64 = 3e-4;
 
 /// Powers must balance to this, or as near as that many further corrections bring them.
 const POWER_TOLERANCE: f64 = 1e-9;
@@ -59,7 +60,7 @@ const POWER_CORRECTIONS: u32 = 3;
 const REST: f64 = 1e-6;
 /// Share of `||sqrt(D) u||^2` in that scale: far below the dissipation of a strained flow, above
 /// the rounding of a rigid one.
-const RIGID_POWER: f64 = 1e-2;
+const RIGID_POWER: f64 = 3e-2;
 
 /// Most corrections that a new one is combined with.
 const MOST_DIRECTIONS: usize = 6;
@@ -234,6 +235,8 @@ struct Residual<const D: usize> {
     divergence_norm: f64,
     /// `||B' p||^2_{1/D}`, cell by cell.
     pressure_norm: f64,
+    /// `||W^-1 p||^2`, the divergence that would make such a pressure.
+    yielding: f64,
 }
 
 impl<const D: usize> Stokes<D> {
@@ -343,7 +346,10 @@ impl<const D: usize> Stokes<D> {
                 return Err(SolveError::NonFinite { corrections: report.corrections });
             }
             let balanced = report.residual <= stopping.tolerance;
-            let converged = balanced && report.divergence <= stopping.tolerance;
+            let strain = residual.strain.sqrt();
+            let slack = if strain > 0.0 { residual.yielding.sqrt() / strain } else { 0.0 };
+            let converged = balanced
+                && report.divergence <= stopping.tolerance * (1.0 + PRESSURE_SHARE * slack);
             if converged {
                 if further == POWER_CORRECTIONS || report.power_error() <= POWER_TOLERANCE {
                     return Ok(());
@@ -371,7 +377,7 @@ impl<const D: usize> Stokes<D> {
                 continue;
             }
             if content == Content::Mixed || content != self.cells[cell].built_from {
-                self.build(cell, quadrature);
+                self.build(cell, quadrature, restoring);
                 self.cells[cell].built_from = content;
             }
             self.scatter(cell);
@@ -381,7 +387,7 @@ impl<const D: usize> Stokes<D> {
         if D == 3 { self.diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
     }
 
-    fn build(&mut self, cell: usize, quadrature: &Quadrature) {
+    fn build(&mut self, cell: usize, quadrature: &Quadrature, restoring: &Restoring) {
         let size = self.mesh.cell_size(cell);
         let area = size[0] * size[1];
         let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
@@ -401,6 +407,14 @@ impl<const D: usize> Stokes<D> {
             && let Some(modes) = SpinModes::new(quadrature, cell, size)
         {
             modes.add_stiffness(&mut k);
+        }
+        if restoring.cell_strength(cell) > 0.0 {
+            for i in 0..2 * NODES {
+                for j in 0..NODES * (i / NODES + 1) {
+                    let (nodes, components) = ([i % NODES, j % NODES], [i / NODES, j / NODES]);
+                    k[i][j] += restoring.cell_entry(cell, nodes, components);
+                }
+            }
         }
         let mass = pressure_mass(area);
         let viscosity = quadrature.mean_viscosity[cell] + if D == 3 { turning } else { 0.0 };
@@ -521,7 +535,7 @@ impl<const D: usize> Stokes<D> {
         out.force.extend_from_slice(nodal);
         out.divergence.resize(self.mesh.cells(), [0.0; 3]);
         (out.dissipation, out.strain, out.divergence_norm) = (0.0, 0.0, 0.0);
-        (out.restoring, out.pressure_norm) = (0.0, 0.0);
+        (out.restoring, out.pressure_norm, out.yielding) = (0.0, 0.0, 0.0);
         for face in &restoring.faces {
             let nodes = SIDE_NODES[face.normal].map(|a| self.nodes[face.cell][a]);
             let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
@@ -553,6 +567,8 @@ impl<const D: usize> Stokes<D> {
             let bu = divergence.apply(&u);
             for q in 0..3 {
                 let rp = bu[q] + compliance * mass[q] * pressure[q];
+                let needed = pressure[q] / self.cells[cell].penalty[q];
+                out.yielding += needed * needed / mass[q];
                 out.divergence[cell][q] = rp;
                 out.divergence_norm += rp * rp / mass[q];
                 out.dissipation += compliance * mass[q] * pressure[q] * pressure[q];
@@ -560,6 +576,15 @@ impl<const D: usize> Stokes<D> {
             for (a, node) in self.nodes[cell].into_iter().enumerate() {
                 for c in 0..D {
                     out.force[node][c] += g[a][c] - internal.force[a][c];
+                }
+            }
+            if restoring.cell_strength(cell) > 0.0 {
+                let along = u.map(|u| [u[0], u[1]]);
+                let (force, power) = restoring.cell_force(cell, &self.nodes[cell], along);
+                out.restoring += power;
+                for (node, f) in self.nodes[cell].into_iter().zip(force) {
+                    out.force[node][0] += f[0];
+                    out.force[node][1] += f[1];
                 }
             }
         }

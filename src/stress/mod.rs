@@ -38,8 +38,8 @@ pub struct Criteria {
     pub director: f64,
     /// Particles out of the domain or inside a solid.
     pub outside: f64,
-    /// Largest speed over that of the first instant, or over a thousandth of the scene's own unit
-    /// of speed where that is larger.
+    /// Largest speed over that of the first instant, or over a tenth of the scene's own unit of
+    /// speed where that is larger.
     pub growth: f64,
     /// Farthest that a carried viscosity or density goes beyond its first extrema, relative to the
     /// larger; incompressible scenes.
@@ -50,7 +50,7 @@ pub struct Criteria {
 
 /// The bounds. Drift is that of a coarse mesh, where a row of particles is a large part of a rim.
 pub const CRITERIA: Criteria = Criteria {
-    power: 1e-7,
+    power: 1e-6,
     divergence: 1e-9,
     corrections: 40.0,
     misplaced: 1.0,

@@ -39,7 +39,7 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
         (
             "growth of speed",
             c.growth,
-            "largest speed over the first, or over 1e-3 of the scene's own",
+            "largest speed over the first, or over 0.1 of the scene's own",
         ),
         ("carried values", c.extrema, "how far viscosities and densities leave their first range"),
     ] {

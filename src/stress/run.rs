@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// Speeds below this share of a scene's own unit are rest.
-const LEAST_SPEED: f64 = 1e-3;
+const LEAST_SPEED: f64 = 0.1;
 
 /// The first instant, which later ones are compared with.
 struct First {
