@@ -63,7 +63,7 @@ const REST: f64 = 1e-6;
 const RIGID_POWER: f64 = 3e-2;
 
 /// Most corrections that a new one is combined with.
-const MOST_DIRECTIONS: usize = 6;
+const MOST_DIRECTIONS: usize = 16;
 
 /// When the corrections stop.
 #[derive(Clone, Copy, Debug)]
@@ -96,9 +96,10 @@ pub struct Report {
 }
 
 impl Report {
-    /// Difference of the powers over the larger of them.
+    /// What is left of the powers, over the largest of them.
     pub fn power_error(&self) -> f64 {
-        let larger = self.power_in.abs().max(self.dissipation.abs()).max(REST * self.power_scale);
+        let larger = [self.power_in, self.dissipation, self.restoring, REST * self.power_scale];
+        let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));
         let difference = (self.power_in - self.dissipation - self.restoring).abs();
         if larger > 0.0 { difference / larger } else { 0.0 }
     }

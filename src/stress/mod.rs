@@ -54,11 +54,11 @@ pub const CRITERIA: Criteria = Criteria {
     divergence: 1e-9,
     corrections: 40.0,
     misplaced: 1.0,
-    drift: 0.03,
+    drift: 0.05,
     volume: 1e-10,
     director: 1e-12,
     outside: 0.0,
-    growth: 20.0,
+    growth: 100.0,
     extrema: 0.05,
     margin: 2.0,
 };
