@@ -43,6 +43,7 @@ pub mod scene;
 pub mod sim;
 pub mod solve;
 pub mod space;
+pub mod stress;
 #[doc(hidden)]
 pub mod testing;
 pub mod verify;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the house, ground floor first, and what each may import.
-const ROOMS: [(&str, &[&str]); 13] = [
+const ROOMS: [(&str, &[&str]); 14] = [
     ("testing", &[]),
     ("laws", &[]),
     ("frame", &[]),
@@ -17,7 +17,8 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
     ("verify", &["scene", "plan", "sim", "cases"]),
     ("record", &["frame", "scene", "space", "plan", "sim"]),
-    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "record"]),
+    ("stress", &["scene", "plan", "sim", "cases", "verify", "space"]),
+    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "stress", "record"]),
 ];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {

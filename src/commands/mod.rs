@@ -4,6 +4,7 @@ mod check;
 mod plan;
 mod presets;
 mod run;
+mod stress;
 mod verify;
 
 use crate::cases::CaseError;
@@ -70,6 +71,8 @@ enum Command {
     Presets(presets::Args),
     /// Measure every case with a known answer, and print what was found
     Verify(verify::Args),
+    /// Run hostile scenes, and print a verdict for each
+    Stress(stress::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -166,6 +169,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Presets(args) => presets::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Stress(args) => stress::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

@@ -72,6 +72,25 @@ fn shifted(s: &Sym2, f: f64) -> Sym2 {
     Sym2 { a: s.a + f, b: s.b + f, c: s.c }
 }
 
+impl PointLaw {
+    /// What the coupling viscosity has beyond the shear viscosity.
+    pub fn excess_coupling(&self) -> f64 {
+        (self.coupling - self.shear.mean()).max(0.0)
+    }
+
+    /// The law with no more coupling than shear viscosity.
+    pub fn without_excess(&self) -> Self {
+        PointLaw { coupling: self.coupling - self.excess_coupling(), ..*self }
+    }
+
+    /// Viscosity that rotation adds to a flow that varies over the length `h`: the coupling
+    /// viscosity if the rotation is too stiff to follow, `M/h^2` if it follows.
+    pub fn turning_viscosity(&self, h: f64) -> f64 {
+        let follow = self.couple / (h * h);
+        if follow > 0.0 { self.coupling * follow / (self.coupling + follow) } else { 0.0 }
+    }
+}
+
 /// How the materials that share a cell combine at an integration point.
 ///
 /// - Deviatoric viscosity: harmonic, `S^-1 = sum phi_m S_m^-1`, so a cell cut by an interface

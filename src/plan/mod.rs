@@ -186,6 +186,9 @@ pub struct ClockPlan {
     pub max_step: Option<f64>,
     pub courant: f64,
     pub strain: f64,
+    /// Largest step that leaves a stratified scene at rest where it is; `None` where nothing could
+    /// restore anything.
+    pub relaxation: Option<f64>,
     /// Times met exactly: frames and changes, ascending, the end included.
     pub stops: Vec<f64>,
     /// Times of frames, ascending.

@@ -100,10 +100,28 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
         .any(|matter| plan.effects.gravity && has_contrast(&matter.materials));
     let share = scene.accuracy.stabilisation;
     plan.method.stabilisation = (stratified && share > 0.0).then_some(share);
+    plan.clock.relaxation = (0..=plan.changes.len())
+        .map(|k| if k == 0 { &plan.state } else { &plan.changes[k - 1].state })
+        .filter_map(|matter| relaxation(matter, &plan.mesh))
+        .reduce(f64::min)
+        .map(|time| RELAXATIONS * time);
     plan.clock.stops.sort_by(f64::total_cmp);
     let least = 1e-9 * plan.clock.end;
     plan.clock.stops.dedup_by(|b, a| *b - *a < least);
     Ok(plan)
+}
+
+/// Steps are at most this many times the relaxation time of a stratification. At rest the solver
+/// leaves speeds of its tolerance times the scene's own, and a step moves every particle that
+/// far times its number of relaxation times.
+const RELAXATIONS: f64 = 1e4;
+
+/// `eta/(rho g L)` with the largest viscosity, for constant densities that differ.
+fn relaxation(matter: &Matter, mesh: &Mesh) -> Option<f64> {
+    let largest = |f: fn(&Material) -> f64| matter.materials.iter().map(f).fold(0.0, f64::max);
+    let extent = (mesh.x.end() - mesh.x.start()).max(mesh.y.end() - mesh.y.start());
+    let weight = largest(|m| m.density) * matter.gravity[0].hypot(matter.gravity[1]) * extent;
+    (weight > 0.0 && has_contrast(&matter.materials)).then(|| largest(|m| m.viscosity) / weight)
 }
 
 /// Whether there is more than one density.
@@ -1522,6 +1540,7 @@ fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<ClockPlan> {
     Ok(ClockPlan {
         end,
         max_step: max_step.map(|v| v / units.time),
+        relaxation: None,
         courant: t.courant,
         strain: t.strain,
         stops,

@@ -15,6 +15,8 @@ pub enum Limiter {
     Strain,
     /// `time.max_step`
     MaxStep,
+    /// Many times the relaxation time of the stratification.
+    Relaxation,
     /// Steps grow by no more than a half each.
     Growth,
     /// A frame, a scheduled change or the end had to be met.
@@ -28,6 +30,7 @@ impl Limiter {
             Limiter::Courant => "courant",
             Limiter::Strain => "strain",
             Limiter::MaxStep => "max_step",
+            Limiter::Relaxation => "relaxation",
             Limiter::Growth => "growth",
             Limiter::Stop => "stop",
         }
@@ -65,6 +68,9 @@ pub fn next_step(
     limit(clock.strain / speeds.strain_rate, Limiter::Strain);
     if let Some(dt) = clock.max_step {
         limit(dt, Limiter::MaxStep);
+    }
+    if let Some(dt) = clock.relaxation {
+        limit(dt, Limiter::Relaxation);
     }
     if let Some(dt) = previous {
         limit(GROWTH * dt, Limiter::Growth);

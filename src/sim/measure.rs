@@ -11,9 +11,6 @@ use crate::space::shape::Shape;
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
-/// Powers below this share of what the loads could have are rounding: the scene is at rest.
-const REST: f64 = 1e-6;
-
 /// A particle may cross this many cells that grading made small for one usual cell: their rows
 /// reach across the domain and know nothing of the flow far from what they are for. On the silo,
 /// lips graded by 8, outflow at 0.7 ms was 4.077 in steps of four small cells (half a usual one)
@@ -90,22 +87,16 @@ impl<const D: usize> Simulation<D> {
         let centre = Shape::at([0.0; 2]);
         let layered: Vec<bool> =
             self.matter.materials.iter().map(|m| m.layer_viscosity.is_some()).collect();
-        let mut speeds = Speeds { crossings: 0.0, strain_rate: 0.0 };
-        let usual = [&mesh.x, &mesh.y]
-            .map(|axis| (0..axis.cells()).map(|k| axis.size(k)).fold(0.0, f64::max));
+        let velocity = &self.flow.velocity;
+        let crossings = self.crossings(|node| [velocity[node][0], velocity[node][1]]);
+        let mut speeds = Speeds { crossings, strain_rate: 0.0 };
+        if !self.plan.effects.directors {
+            return speeds;
+        }
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            let [hx, hy] = mesh.cell_size(cell);
-            let nodal = self.flow.of_cell(mesh, cell);
-            let counted = [hx, hy].map(|h| h * GRADED_ALLOWANCE);
-            for u in &nodal {
-                for c in 0..2 {
-                    let size = counted[c].min(usual[c]);
-                    speeds.crossings = speeds.crossings.max(u[c].abs() / size);
-                }
-            }
-            if self.plan.effects.directors
-                && (0..layered.len()).any(|m| layered[m] && self.quadrature.fraction(cell, m) > 0.0)
-            {
+            if (0..layered.len()).any(|m| layered[m] && self.quadrature.fraction(cell, m) > 0.0) {
+                let [hx, hy] = mesh.cell_size(cell);
+                let nodal = self.flow.of_cell(mesh, cell);
                 let rates = Rates::new(&PointShape::new(&centre, [hx, hy]), &nodal);
                 let spin = rates.relative_spin.abs();
                 let rate = (2.0 * rates.strain_squared()).sqrt() + spin;
@@ -113,6 +104,24 @@ impl<const D: usize> Simulation<D> {
             }
         }
         speeds
+    }
+
+    /// Largest number of cells crossed per unit time with these velocities of the nodes.
+    pub(super) fn crossings(&self, velocity: impl Fn(usize) -> [f64; 2]) -> f64 {
+        let mesh = &self.plan.mesh;
+        let usual = [&mesh.x, &mesh.y]
+            .map(|axis| (0..axis.cells()).map(|k| axis.size(k)).fold(0.0, f64::max));
+        let mut most: f64 = 0.0;
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let counted = mesh.cell_size(cell).map(|h| h * GRADED_ALLOWANCE);
+            for node in mesh.cell_nodes(cell) {
+                let u = velocity(node);
+                for c in 0..2 {
+                    most = most.max(u[c].abs() / counted[c].min(usual[c]));
+                }
+            }
+        }
+        most
     }
 
     /// Projected area of each material over the volume of its particles.
@@ -197,7 +206,6 @@ impl<const D: usize> Simulation<D> {
         };
         let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
         let work = trapezoid(before.work, self.last_other_power, other);
-        let larger = power_in.abs().max(dissipation.abs()).max(REST * r.load_scale * u.power());
         let drift = self
             .projected_shares()
             .iter()
@@ -229,11 +237,7 @@ impl<const D: usize> Simulation<D> {
             power_in,
             dissipation,
             stabilisation,
-            power_error: if larger > 0.0 {
-                (power_in - dissipation - stabilisation).abs() / larger
-            } else {
-                0.0
-            },
+            power_error: r.power_error(),
             divergence_error: r.divergence,
             volume_error: self.volume_error(),
             iterations,

@@ -5,10 +5,14 @@
 //! ```text
 //! d.S d~ + beta tr(D) tr(D~) + 4 eta_c (o - w)(o~ - w~) + M grad w . grad w~ - p div u~
 //! ```
+//! Of the coupling viscosity only what does not exceed the shear viscosity is integrated point by
+//! point; [`spin`](super::spin) does the rest.
+//!
 //! Local unknowns are ordered component by component: `9 c + a` for component `c` (u, v, w) of
 //! node `a`. `D` is 2 for the classical continuum, 3 with Cosserat rotation.
 
 use super::quadrature::{CutStiffness, IntegrationPoint, Quadrature};
+use super::spin::SpinModes;
 use crate::laws::point::PointLaw;
 use crate::space::shape::{
     CENTRE, D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, N_AT_GAUSS, NODES,
@@ -218,16 +222,27 @@ pub struct Internal<const D: usize> {
 impl<const D: usize> Internal<D> {
     /// Of a cell of this size with nodal values `u`.
     pub fn new(quadrature: &Quadrature, cell: usize, size: [f64; 2], u: &Nodal<D>) -> Self {
-        let Some(points) = quadrature.gauss_points(cell) else {
-            return Internal::at_any_points(quadrature, cell, size, u);
+        let mut out = match quadrature.gauss_points(cell) {
+            None => Internal::at_any_points(quadrature, cell, size, u),
+            Some(points) => {
+                let cut = quadrature.cut(cell);
+                let mut points = *points;
+                for p in &mut points {
+                    p.law = p.law.without_excess();
+                    if let Some(cut) = cut {
+                        p.law = p.law.with_viscosity_scaled(cut.rest);
+                    }
+                }
+                let mut out = Internal::at_gauss_points(&points, size, u);
+                cut.iter().for_each(|cut| out.add_cut(cut, u));
+                out
+            }
         };
-        let Some(cut) = quadrature.cut(cell) else {
-            return Internal::at_gauss_points(points, size, u);
-        };
-        let mut rest = *points;
-        rest.iter_mut().for_each(|p| p.law = p.law.with_viscosity_scaled(cut.rest));
-        let mut out = Internal::at_gauss_points(&rest, size, u);
-        out.add_cut(cut, u);
+        if D == 3
+            && let Some(modes) = SpinModes::new(quadrature, cell, size)
+        {
+            out.dissipation += modes.add_force(u, &mut out.force);
+        }
         out
     }
 
@@ -255,7 +270,8 @@ impl<const D: usize> Internal<D> {
         let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
         quadrature.for_points(cell, |p, shape| {
             let s = PointShape::new(shape, size);
-            out.stress(p, &Rates::new(&s, u), size).add_force(&s, &mut out.force);
+            let p = IntegrationPoint { law: p.law.without_excess(), ..*p };
+            out.stress(&p, &Rates::new(&s, u), size).add_force(&s, &mut out.force);
         });
         out
     }

@@ -8,5 +8,6 @@ pub mod interface;
 pub mod laminate;
 pub mod minority;
 pub mod quadrature;
+pub mod spin;
 pub mod stokes;
 pub mod weight;

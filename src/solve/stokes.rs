@@ -19,6 +19,11 @@
 //! pressure of a weak pocket in stiff surroundings, which single corrections of weight `r eta` of
 //! the pocket approach by a share `r eta/eta_stiff` each, is so found at once; the residuals are
 //! always computed afresh from the fields.
+//!
+//! A solution that has converged must also balance its power: where one coefficient exceeds what
+//! resists the flow by many orders (an internal length a million times the domain, layers a million
+//! times weaker along than across), a residual that is small beside the former leaves an error in
+//! the latter, and a few more corrections bring it down to rounding.
 
 use super::buoyancy::{Restoring, SIDE_NODES};
 use super::cholesky::{FactorError, SparseCholesky};
@@ -27,6 +32,7 @@ use super::element::{
     add_cut_stiffness, add_stiffness, mirror, pair, pressure_mass,
 };
 use super::quadrature::{Content, Quadrature};
+use super::spin::SpinModes;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
 use crate::space::mesh::Mesh;
@@ -41,8 +47,23 @@ const PENALTY: f64 = 1e4;
 /// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
 const RIGID_SHARE: f64 = 1e-3;
 
+/// Share of the pressure's forces in the scale of the residual, and of what the penalty makes of
+/// the pressure in that of the divergence: at the usual tolerance a unit or two in the last place of
+/// a pressure that is far larger than the stresses of the flow.
+const PRESSURE_SHARE: f64 = 3e-4;
+
+/// Powers must balance to this, or as near as that many further corrections bring them.
+const POWER_TOLERANCE: f64 = 1e-9;
+const POWER_CORRECTIONS: u32 = 3;
+
+/// Powers below this share of [`Report::power_scale`] are rounding: the scene is at rest.
+const REST: f64 = 1e-6;
+/// Share of `||sqrt(D) u||^2` in that scale: far below the dissipation of a strained flow, above
+/// the rounding of a rigid one.
+const RIGID_POWER: f64 = 3e-2;
+
 /// Most corrections that a new one is combined with.
-const MOST_DIRECTIONS: usize = 6;
+const MOST_DIRECTIONS: usize = 16;
 
 /// When the corrections stop.
 #[derive(Clone, Copy, Debug)]
@@ -66,12 +87,22 @@ pub struct Report {
     pub dissipation: f64,
     /// Power that the restoring terms of [`super::buoyancy`] take from the flow; numerical.
     pub restoring: f64,
-    /// `||f||^2_{1/D}`: the power the loads would have on a mesh of one element; a scale for
-    /// powers that rounding alone makes.
-    pub load_scale: f64,
+    /// `||f||^2_{1/D}`, the power the loads would have on a mesh of one element, and a little of
+    /// `||sqrt(D) u||^2`: a scale for powers that rounding alone makes.
+    pub power_scale: f64,
     /// Rotation unknowns that some Cosserat material acts on.
     pub active_rotation: usize,
     pub seconds: Seconds,
+}
+
+impl Report {
+    /// What is left of the powers, over the largest of them.
+    pub fn power_error(&self) -> f64 {
+        let larger = [self.power_in, self.dissipation, self.restoring, REST * self.power_scale];
+        let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));
+        let difference = (self.power_in - self.dissipation - self.restoring).abs();
+        if larger > 0.0 { difference / larger } else { 0.0 }
+    }
 }
 
 /// Wall seconds of the parts of a solution.
@@ -203,6 +234,10 @@ struct Residual<const D: usize> {
     restoring: f64,
     strain: f64,
     divergence_norm: f64,
+    /// `||B' p||^2_{1/D}`, cell by cell.
+    pressure_norm: f64,
+    /// `||W^-1 p||^2`, the divergence that would make such a pressure.
+    yielding: f64,
 }
 
 impl<const D: usize> Stokes<D> {
@@ -299,10 +334,11 @@ impl<const D: usize> Stokes<D> {
     ) -> Result<(), SolveError> {
         let &Given { quadrature, loads, stopping } = given;
         let load = loads.nodal;
+        let mut further = 0;
         loop {
             self.residual(quadrature, loads, flow, &mut work.residual);
             let residual = &work.residual;
-            (report.residual, report.divergence, report.load_scale) =
+            (report.residual, report.divergence, report.power_scale) =
                 self.norms(residual, load, flow);
             report.dissipation = residual.dissipation;
             report.restoring = residual.restoring;
@@ -310,15 +346,22 @@ impl<const D: usize> Stokes<D> {
             if !(report.residual.is_finite() && report.divergence.is_finite()) {
                 return Err(SolveError::NonFinite { corrections: report.corrections });
             }
-            if report.residual <= stopping.tolerance && report.divergence <= stopping.tolerance {
-                return Ok(());
-            }
-            if report.corrections == stopping.max_corrections {
+            let balanced = report.residual <= stopping.tolerance;
+            let strain = residual.strain.sqrt();
+            let slack = if strain > 0.0 { residual.yielding.sqrt() / strain } else { 0.0 };
+            let converged = balanced
+                && report.divergence <= stopping.tolerance * (1.0 + PRESSURE_SHARE * slack);
+            if converged {
+                if further == POWER_CORRECTIONS || report.power_error() <= POWER_TOLERANCE {
+                    return Ok(());
+                }
+                further += 1;
+            } else if report.corrections >= stopping.max_corrections {
                 return Err(self.stalled(residual, report, stopping.tolerance));
             }
-            let balanced = report.residual <= stopping.tolerance;
             self.correct(work).map_err(|e| self.explain(e))?;
-            self.combine(quadrature, work, balanced);
+            // Sums of corrections mind the divergence only; here the forces are to be corrected.
+            self.combine(quadrature, work, balanced && !converged);
             self.apply(work, flow);
             report.corrections += 1;
         }
@@ -335,7 +378,7 @@ impl<const D: usize> Stokes<D> {
                 continue;
             }
             if content == Content::Mixed || content != self.cells[cell].built_from {
-                self.build(cell, quadrature);
+                self.build(cell, quadrature, restoring);
                 self.cells[cell].built_from = content;
             }
             self.scatter(cell);
@@ -345,20 +388,38 @@ impl<const D: usize> Stokes<D> {
         if D == 3 { self.diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
     }
 
-    fn build(&mut self, cell: usize, quadrature: &Quadrature) {
+    fn build(&mut self, cell: usize, quadrature: &Quadrature, restoring: &Restoring) {
         let size = self.mesh.cell_size(cell);
         let area = size[0] * size[1];
         let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
         let cut = quadrature.cut(cell);
+        // What a stiff rotation adds to the viscosity of a flow on the scale of the cell.
+        let (mut turning, thickness) = (0.0, size[0].min(size[1]));
         quadrature.for_points(cell, |p, shape| {
-            let law = cut.map_or(p.law, |cut| p.law.with_viscosity_scaled(cut.rest));
+            let law = p.law.without_excess();
+            let law = cut.map_or(law, |cut| law.with_viscosity_scaled(cut.rest));
             add_stiffness::<D>(&mut k, &PointShape::new(shape, size), &law, p.weight * area);
+            turning += p.weight * p.law.turning_viscosity(thickness);
         });
         if let Some(cut) = cut {
             add_cut_stiffness(&mut k, cut);
         }
+        if D == 3
+            && let Some(modes) = SpinModes::new(quadrature, cell, size)
+        {
+            modes.add_stiffness(&mut k);
+        }
+        if restoring.cell_strength(cell) > 0.0 {
+            for i in 0..2 * NODES {
+                for j in 0..NODES * (i / NODES + 1) {
+                    let (nodes, components) = ([i % NODES, j % NODES], [i / NODES, j / NODES]);
+                    k[i][j] += restoring.cell_entry(cell, nodes, components);
+                }
+            }
+        }
         let mass = pressure_mass(area);
-        let give = 1.0 / (PENALTY * quadrature.mean_viscosity[cell]) + quadrature.compliance[cell];
+        let viscosity = quadrature.mean_viscosity[cell] + if D == 3 { turning } else { 0.0 };
+        let give = 1.0 / (PENALTY * viscosity) + quadrature.compliance[cell];
         let out = &mut self.cells[cell];
         out.penalty = mass.map(|m| 1.0 / (m * give));
         for a in 0..NODES {
@@ -475,7 +536,7 @@ impl<const D: usize> Stokes<D> {
         out.force.extend_from_slice(nodal);
         out.divergence.resize(self.mesh.cells(), [0.0; 3]);
         (out.dissipation, out.strain, out.divergence_norm) = (0.0, 0.0, 0.0);
-        out.restoring = 0.0;
+        (out.restoring, out.pressure_norm, out.yielding) = (0.0, 0.0, 0.0);
         for face in &restoring.faces {
             let nodes = SIDE_NODES[face.normal].map(|a| self.nodes[face.cell][a]);
             let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
@@ -499,9 +560,16 @@ impl<const D: usize> Stokes<D> {
             let compliance = quadrature.compliance[cell];
             let mut g = [[0.0; D]; NODES];
             divergence.add_transposed(&pressure, &mut g);
+            for (a, node) in self.nodes[cell].into_iter().enumerate() {
+                for c in 0..2 {
+                    out.pressure_norm += g[a][c] * g[a][c] / self.diagonal[node][c];
+                }
+            }
             let bu = divergence.apply(&u);
             for q in 0..3 {
                 let rp = bu[q] + compliance * mass[q] * pressure[q];
+                let needed = pressure[q] / self.cells[cell].penalty[q];
+                out.yielding += needed * needed / mass[q];
                 out.divergence[cell][q] = rp;
                 out.divergence_norm += rp * rp / mass[q];
                 out.dissipation += compliance * mass[q] * pressure[q] * pressure[q];
@@ -511,10 +579,19 @@ impl<const D: usize> Stokes<D> {
                     out.force[node][c] += g[a][c] - internal.force[a][c];
                 }
             }
+            if restoring.cell_strength(cell) > 0.0 {
+                let along = u.map(|u| [u[0], u[1]]);
+                let (force, power) = restoring.cell_force(cell, &self.nodes[cell], along);
+                out.restoring += power;
+                for (node, f) in self.nodes[cell].into_iter().zip(force) {
+                    out.force[node][0] += f[0];
+                    out.force[node][1] += f[1];
+                }
+            }
         }
     }
 
-    /// Scaled residual, relative divergence, and the loads' own scale of power.
+    /// Scaled residual, relative divergence, and a scale of power.
     fn norms(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> (f64, f64, f64) {
         let (mut rr, mut ff, mut uu) = (0.0, 0.0, 0.0);
         for node in 0..self.mesh.nodes() {
@@ -532,10 +609,10 @@ impl<const D: usize> Stokes<D> {
         }
         // The last two terms keep the ratio sensible when nothing moves, and in a rigid rotation,
         // where divergence and strain are both rounding.
-        let scale = ff.sqrt() + uu.sqrt();
+        let scale = ff.sqrt() + uu.sqrt() + PRESSURE_SHARE * r.pressure_norm.sqrt();
         let strain = r.strain.sqrt() + ff.sqrt() + RIGID_SHARE * uu.sqrt();
         let ratio = |a: f64, b: f64| if a == 0.0 { 0.0 } else { a / b };
-        (ratio(rr.sqrt(), scale), ratio(r.divergence_norm.sqrt(), strain), ff)
+        (ratio(rr.sqrt(), scale), ratio(r.divergence_norm.sqrt(), strain), ff + RIGID_POWER * uu)
     }
 
     /// Power of the loads and of the reactions on moving boundaries.

@@ -84,6 +84,17 @@ impl Weight {
         self.at_gauss.iter().map(mean).collect()
     }
 
+    /// Gradient of the density inside each cell, in its reference coordinates.
+    pub fn slopes(&self) -> Vec<[f64; 2]> {
+        let slope = |d: &[f64; 9]| {
+            let part = |c: usize| -> f64 {
+                d.iter().zip(GAUSS_3X3.iter()).map(|(d, g)| 3.0 * d * g.weight * g.r[c]).sum()
+            };
+            [part(0), part(1)]
+        };
+        self.at_gauss.iter().map(slope).collect()
+    }
+
     /// Mass at each Gauss point as a share of the cell's area, reference coordinates, shape
     /// functions.
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {

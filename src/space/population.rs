@@ -59,13 +59,9 @@ impl Population {
     fn split(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
         let before = particles.len();
         let least = (self.target() / 2).max(1);
-        let mut emptied = Vec::new();
         for cell in 0..mesh.cells() {
             let mut members: Vec<usize> = particles.of_cell(cell).collect();
             if members.is_empty() {
-                if !mesh.solid[cell] {
-                    emptied.push(cell);
-                }
                 continue;
             }
             let nominal = mesh.cell_area(cell) / self.target() as f64;
@@ -87,12 +83,26 @@ impl Population {
                 count.splits += 1;
             }
         }
-        for cell in emptied {
-            count.healed += u64::from(self.heal(mesh, particles, cell));
-        }
         if particles.len() != before {
             particles.sort(mesh);
         }
+        while self.heal_all(mesh, particles, count) {}
+    }
+
+    /// Refills empty cells that have a neighbour that is not; whether there were any. Cells amid
+    /// empty ones come next, from their refilled neighbours.
+    fn heal_all(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) -> bool {
+        let before = particles.len();
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            if particles.of_cell(cell).is_empty() {
+                count.healed += u64::from(self.heal(mesh, particles, cell));
+            }
+        }
+        let any = particles.len() != before;
+        if any {
+            particles.sort(mesh);
+        }
+        any
     }
 
     /// A place (reference coordinates) that lacks a particle: in an empty quadrant, or, where

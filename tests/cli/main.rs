@@ -4,6 +4,7 @@ mod commands;
 mod recording;
 mod refusals;
 mod runs;
+mod stress;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,0 +1,71 @@
+//! `grainscope stress`: hard cases, each with a verdict.
+
+use super::{Failure, print};
+use crate::stress::{self, Outcome, Trial};
+use std::path::PathBuf;
+
+/// Run hostile scenes and say how each stays inside fixed criteria.
+///
+/// Prints one table as Markdown. Exit code 6 if a trial fails; its scene and the reason are kept.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Only trials whose group or name contains one of these (any case)
+    #[arg(value_name = "NAME-FILTER")]
+    filters: Vec<String>,
+    /// The short trials only: under a minute
+    #[arg(long)]
+    quick: bool,
+    /// Print criteria and outcomes as JSON
+    #[arg(long)]
+    json: bool,
+    /// Write FOLDER/stress.md; only for the whole battery
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["quick", "filters"])]
+    write: Option<PathBuf>,
+    /// Folder for the scenes of failing trials
+    #[arg(long, value_name = "DIR", default_value = "stress-failures")]
+    keep: PathBuf,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let filters: Vec<String> = args.filters.iter().map(|f| f.to_lowercase()).collect();
+    let wanted = |t: &Trial| {
+        let title = format!("{}: {}", t.group, t.name).to_lowercase();
+        (t.quick || !args.quick)
+            && (filters.is_empty() || filters.iter().any(|f| title.contains(f)))
+    };
+    let trials: Vec<Trial> = stress::all()?.into_iter().filter(wanted).collect();
+    if trials.is_empty() {
+        return Err(Failure::Usage(format!("no trial is called {:?}", args.filters.join(", "))));
+    }
+    let outcomes = stress::run_all(&trials, |done, o| {
+        eprintln!("{done}/{} {}: {}: {}", trials.len(), o.group, o.name, o.verdict);
+    });
+    if args.json {
+        print(&stress::json(&outcomes).map_err(|e| Failure::Environment(e.to_string()))?)?;
+    } else {
+        print(&stress::table(&outcomes).markdown())?;
+    }
+    if let Some(folder) = &args.write {
+        let file = folder.join("stress.md");
+        std::fs::create_dir_all(folder)
+            .and_then(|()| std::fs::write(&file, stress::markdown(&outcomes)))
+            .map_err(|e| Failure::Environment(format!("{}: {e}", file.display())))?;
+    }
+    conclude(args, &trials, &outcomes)
+}
+
+/// Keeps what failed.
+fn conclude(args: &Args, trials: &[Trial], outcomes: &[Outcome]) -> Result<(), Failure> {
+    let mut lines = Vec::new();
+    for (trial, o) in trials.iter().zip(outcomes).filter(|(_, o)| o.verdict.is_failure()) {
+        let place = stress::keep(&args.keep, trial, o)
+            .map_err(|e| Failure::Environment(format!("{}: {e}", args.keep.display())))?;
+        lines.push(format!("\n  {}: {}: {}\n    {}", o.group, o.name, o.verdict, place.display()));
+    }
+    if lines.is_empty() {
+        eprintln!("{} trials, none failed", outcomes.len());
+        return Ok(());
+    }
+    let head = format!("{} of {} trials failed", lines.len(), outcomes.len());
+    Err(Failure::Differs(head + &lines.concat()))
+}

@@ -1,0 +1,162 @@
+//! The part of the coupling viscosity that exceeds the shear viscosity, without locking.
+//!
+//! As `eta_c -> infinity` at fixed `M` (the couple-stress limit) the rotation must follow the spin,
+//! `o = w`. The spin of a biquadratic velocity is of another shape than a biquadratic rotation, and
+//! nine points ask more of both than they can give: measured on the coupled cell, the velocity then
+//! converges at second order instead of third. So what `eta_c` has beyond `eta` acts on the relative
+//! spin `s = o - w` only through its best linear function of the cell's coordinates,
+//!
+//! ```text
+//! 4 integral e Ps Ps~,   e = max(0, eta_c - eta),   P: weighted by e on 1, xi, eta
+//! ```
+//! which is what the pressure sees of the divergence, and the rest acts everywhere. Fluids with
+//! `eta_c <= eta` have no such part. The error made is that of `e (s - Ps)(s~ - Ps~)`, of fourth
+//! order where `s` is smooth. A weak point of a cut cell weighs little in `P`.
+
+use super::element::{LOCAL, Matrix, Nodal, PointShape};
+use super::quadrature::Quadrature;
+use crate::space::shape::NODES;
+
+/// A function that is this small a part of what it was before it was made orthogonal to others is
+/// rounding.
+const LEAST_PART: f64 = 1e-10;
+
+/// The projected coupling of a cell: `sum_k b_k b_k'`.
+pub struct SpinModes(Vec<[f64; LOCAL]>);
+
+/// An integration point: `4 e` times its volume, `1, xi, eta`, and `s` of unit values.
+struct Point {
+    weight: f64,
+    linear: [f64; 3],
+    spin: [f64; LOCAL],
+}
+
+impl SpinModes {
+    /// Of a cell with rotation; `None` where no point has an excess.
+    pub fn new(quadrature: &Quadrature, cell: usize, size: [f64; 2]) -> Option<Self> {
+        let area = size[0] * size[1];
+        let mut points = Vec::new();
+        quadrature.for_points(cell, |p, shape| {
+            let excess = p.law.excess_coupling();
+            // The part of the shear viscosity of rounding is none.
+            if excess > LEAST_PART * p.law.coupling {
+                let s = PointShape::new(shape, size);
+                let mut spin = [0.0; LOCAL];
+                for a in 0..NODES {
+                    spin[a] = -0.5 * s.gy[a];
+                    spin[NODES + a] = 0.5 * s.gx[a];
+                    spin[2 * NODES + a] = -s.n[a];
+                }
+                let weight = 4.0 * excess * p.weight * area;
+                points.push(Point { weight, linear: [1.0, p.r[0], p.r[1]], spin });
+            }
+        });
+        (!points.is_empty()).then(|| SpinModes::of(&points))
+    }
+
+    fn of(points: &[Point]) -> Self {
+        let product = |a: &[f64], b: &[f64]| -> f64 {
+            points.iter().zip(a.iter().zip(b)).map(|(p, (a, b))| p.weight * a * b).sum()
+        };
+        let mut basis: Vec<Vec<f64>> = Vec::with_capacity(3);
+        for k in 0..3 {
+            let mut f: Vec<f64> = points.iter().map(|p| p.linear[k]).collect();
+            let before = product(&f, &f);
+            // Twice: the first pass leaves rounding of the parts it takes away.
+            for q in basis.iter().chain(&basis) {
+                let along = product(q, &f);
+                f.iter_mut().zip(q).for_each(|(f, q)| *f -= along * q);
+            }
+            let norm = product(&f, &f);
+            if norm > LEAST_PART * before {
+                f.iter_mut().for_each(|f| *f /= norm.sqrt());
+                basis.push(f);
+            }
+        }
+        let mode = |q: &Vec<f64>| {
+            let mut b = [0.0; LOCAL];
+            for (p, q) in points.iter().zip(q) {
+                for i in 0..LOCAL {
+                    b[i] += p.weight * q * p.spin[i];
+                }
+            }
+            b
+        };
+        SpinModes(basis.iter().map(mode).collect())
+    }
+
+    /// Adds to an element matrix, on and below the diagonal of components.
+    pub fn add_stiffness(&self, k: &mut Matrix) {
+        for b in &self.0 {
+            for i in 0..LOCAL {
+                for j in 0..NODES * (i / NODES + 1) {
+                    k[i][j] += b[i] * b[j];
+                }
+            }
+        }
+    }
+
+    /// Adds to the nodal forces; the power.
+    pub fn add_force<const D: usize>(&self, u: &Nodal<D>, force: &mut Nodal<D>) -> f64 {
+        let mut power = 0.0;
+        for b in &self.0 {
+            let along: f64 = (0..NODES * D).map(|i| b[i] * u[i % NODES][i / NODES]).sum();
+            power += along * along;
+            for i in 0..NODES * D {
+                force[i % NODES][i / NODES] += along * b[i];
+            }
+        }
+        power
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::shape::GAUSS_3X3;
+
+    const SIZE: [f64; 2] = [0.7, 1.3];
+
+    fn points(weight: impl Fn(usize) -> f64) -> Vec<Point> {
+        let point = |(g, p): (usize, &crate::space::shape::GaussPoint)| {
+            let s = PointShape::new(&p.shape, SIZE);
+            let mut spin = [0.0; LOCAL];
+            for a in 0..NODES {
+                spin[a] = -0.5 * s.gy[a];
+                spin[NODES + a] = 0.5 * s.gx[a];
+                spin[2 * NODES + a] = -s.n[a];
+            }
+            Point { weight: weight(g), linear: [1.0, p.r[0], p.r[1]], spin }
+        };
+        GAUSS_3X3.iter().enumerate().map(point).collect()
+    }
+
+    #[test]
+    fn a_linear_relative_spin_keeps_all_its_power() {
+        let points = points(|g| 0.3 + 0.1 * g as f64);
+        let modes = SpinModes::of(&points);
+        // u = -y^2, w = 0.4 x: spin y, relative spin y - 0.4 x
+        let u: Nodal<3> = std::array::from_fn(|a| {
+            let (x, y) = ((a % 3) as f64 * 0.5 * SIZE[0], (a / 3) as f64 * 0.5 * SIZE[1]);
+            [-y * y, 0.0, 0.4 * x]
+        });
+        let spin =
+            |p: &Point| -> f64 { (0..LOCAL).map(|i| p.spin[i] * u[i % NODES][i / NODES]).sum() };
+        let expected: f64 = points.iter().map(|p| p.weight * spin(p).powi(2)).sum();
+        let mut force = [[0.0; 3]; NODES];
+        let power = modes.add_force(&u, &mut force);
+        assert!((power - expected).abs() < 1e-13 * expected, "{power} {expected}");
+        let by_force: f64 =
+            (0..NODES * 3).map(|i| force[i % NODES][i / NODES] * u[i % NODES][i / NODES]).sum();
+        assert!((by_force - power).abs() < 1e-13 * power);
+    }
+
+    #[test]
+    fn points_without_weight_leave_fewer_functions() {
+        // One column of points tells nothing about slopes along x.
+        let column = points(|_| 1.0).into_iter().skip(1).step_by(3).collect::<Vec<_>>();
+        assert_eq!(SpinModes::of(&column).0.len(), 2);
+        assert_eq!(SpinModes::of(&column[..1]).0.len(), 1);
+        assert_eq!(SpinModes::of(&points(|g| 10f64.powi(-(g as i32)))).0.len(), 3);
+    }
+}
