@@ -62,8 +62,11 @@ const REST: f64 = 1e-6;
 /// the rounding of a rigid one.
 const RIGID_POWER: f64 = 3e-2;
 
+/// Powers below this share of [`Report::gross_power`] too.
+const CANCELLED: f64 = 1e-5;
+
 /// Most corrections that a new one is combined with.
-const MOST_DIRECTIONS: usize = 16;
+const MOST_DIRECTIONS: usize = 6;
 
 /// When the corrections stop.
 #[derive(Clone, Copy, Debug)]
@@ -90,6 +93,8 @@ pub struct Report {
     /// `||f||^2_{1/D}`, the power the loads would have on a mesh of one element, and a little of
     /// `||sqrt(D) u||^2`: a scale for powers that rounding alone makes.
     pub power_scale: f64,
+    /// Sum over the unknowns of `|f u|`: what the power of the loads is the difference of.
+    pub gross_power: f64,
     /// Rotation unknowns that some Cosserat material acts on.
     pub active_rotation: usize,
     pub seconds: Seconds,
@@ -98,7 +103,8 @@ pub struct Report {
 impl Report {
     /// What is left of the powers, over the largest of them.
     pub fn power_error(&self) -> f64 {
-        let larger = [self.power_in, self.dissipation, self.restoring, REST * self.power_scale];
+        let rest = (REST * self.power_scale).max(CANCELLED * self.gross_power);
+        let larger = [self.power_in, self.dissipation, self.restoring, rest];
         let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));
         let difference = (self.power_in - self.dissipation - self.restoring).abs();
         if larger > 0.0 { difference / larger } else { 0.0 }
@@ -343,6 +349,8 @@ impl<const D: usize> Stokes<D> {
             report.dissipation = residual.dissipation;
             report.restoring = residual.restoring;
             report.power_in = self.power_in(residual, load, flow);
+            let both = load.iter().flatten().zip(flow.velocity.iter().flatten());
+            report.gross_power = both.map(|(f, u)| (f * u).abs()).sum();
             if !(report.residual.is_finite() && report.divergence.is_finite()) {
                 return Err(SolveError::NonFinite { corrections: report.corrections });
             }
