@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the house, ground floor first, and what each may import.
-const ROOMS: [(&str, &[&str]); 13] = [
+const ROOMS: [(&str, &[&str]); 14] = [
     ("testing", &[]),
     ("laws", &[]),
     ("frame", &[]),
@@ -16,8 +16,9 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("sim", &["laws", "frame", "scene", "space", "plan", "solve", "motion"]),
     ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
     ("verify", &["scene", "plan", "sim", "cases"]),
+    ("cost", &["scene", "space", "plan", "sim", "cases", "testing"]),
     ("record", &["frame", "scene", "space", "plan", "sim"]),
-    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "record"]),
+    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "cost", "record"]),
 ];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {

@@ -1,6 +1,8 @@
 //! The command line: the top floor, which nothing imports.
 
 mod check;
+mod cost;
+mod cost_page;
 mod plan;
 mod presets;
 mod run;
@@ -70,6 +72,8 @@ enum Command {
     Presets(presets::Args),
     /// Measure every case with a known answer, and print what was found
     Verify(verify::Args),
+    /// Measure what accuracy costs: a price list of settings
+    Cost(cost::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -166,6 +170,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Presets(args) => presets::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Cost(args) => cost::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

@@ -912,10 +912,8 @@ fn interest(scene: &Scene) -> Result<()> {
         };
         return fault(format!("there is no gauge `{name}`"), &help);
     }
-    let field = matches!(
-        i.quantity,
-        Interesting::Velocity | Interesting::Rotation | Interesting::Pressure
-    );
+    let field =
+        matches!(i.quantity, Interesting::Velocity | Interesting::Rotation | Interesting::Pressure);
     if field && i.at == Moment::Peak {
         return fault("a field has no peak".into(), "give at = \"start\" or at = \"end\"");
     }
