@@ -1,8 +1,12 @@
 //! `grainscope cost`: what accuracy costs on this machine.
 
 use super::{Failure, print};
+use crate::cost::measure::{self, Target};
 use crate::cost::{self, CostError, Effort, List, Machine, list, report};
+use crate::frame::{Plot, Scalar, Series};
+use crate::record::info;
 use crate::record::plots::{Axis, Curve, PlotSpec, line_plot};
+use crate::record::rerun_log::{Race, RecordError};
 use crate::scene::{SceneSource, parse, scene_hash};
 use std::path::{Path, PathBuf};
 
@@ -61,6 +65,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let folder = args.out.clone().unwrap_or_else(|| Path::new("costs").join(&scene.name));
     write(&folder, &list)?;
+    if !args.no_recording {
+        race(&source, &list, &folder.join("race.rrd"))?;
+    }
     if let Some(docs) = &args.write {
         super::cost_page::write(docs, &list)?;
     }
@@ -196,4 +203,58 @@ fn plot(list: &List) -> PlotSpec {
         y: Axis::new("relative error", "").log(),
         curves,
     }
+}
+
+/// Most runs side by side: more are too small to see.
+const LANES: usize = 4;
+
+/// Most pictures of a run.
+const PICTURES: u64 = 60;
+
+/// Runs members of the front once more and records them side by side, each at the seconds it had
+/// taken: one sees what accuracy costs.
+fn race(source: &SceneSource, list: &List, path: &Path) -> Result<(), Failure> {
+    let source = source.with_sets(&list.shortened)?;
+    let target = Target::of(&parse(&source)?)?;
+    let front: Vec<&cost::Entry> = list.front().collect();
+    let mut lanes = vec![];
+    for entry in cost::front::spread(&front, LANES) {
+        let source = source.with_sets(&entry.sets)?;
+        let (_, plan) = super::resolve(&source)?;
+        let accuracy = report::percent(entry.promised);
+        let mut run = info::run_info(&plan, &format!("{accuracy}: {}", entry.label));
+        let quantity = list.quantity.clone();
+        run.plots = vec![Plot {
+            title: format!("{quantity} against seconds computed"),
+            series: vec![Series::new("race/value", accuracy)],
+            log10: false,
+        }];
+        lanes.push((run, std::sync::Arc::new(plan), entry.steps));
+    }
+    let infos: Vec<_> = lanes.iter().map(|l| l.0.clone()).collect();
+    let mut race = Race::open(&infos, &format!("{}: cost of accuracy", list.scene), path)?;
+    for (k, (_, plan, steps)) in lanes.iter().enumerate() {
+        let every = steps.div_ceil(PICTURES).max(1);
+        let mut fault: Option<RecordError> = None;
+        measure::run(plan.clone(), &target, |run, took| {
+            let row = run.row();
+            let shown = row.step % every == 0 || run.is_finished();
+            let frame = crate::frame::Frame {
+                step: row.step,
+                time_s: row.time,
+                wall_s: took.wall,
+                picture: shown.then(|| run.picture()),
+                scalars: vec![Scalar::new("race/value", target.scalar(plan, row))],
+                warnings: vec![],
+            };
+            if fault.is_none() {
+                fault = race.frame(k, &frame).err();
+            }
+        })?;
+        if let Some(fault) = fault {
+            return Err(fault.into());
+        }
+    }
+    race.finish()?;
+    Ok(())
 }

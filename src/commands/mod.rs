@@ -5,6 +5,7 @@ mod cost;
 mod cost_page;
 mod plan;
 mod presets;
+mod purchase;
 mod run;
 mod verify;
 

@@ -23,10 +23,12 @@ pub struct List {
     pub floor: f64,
     /// End of the runs that were measured, and of the scene, s.
     pub horizon: [f64; 2],
+    /// Sets that shorten the scene to what was measured.
+    pub shortened: Vec<String>,
     pub reference: ReferenceLine,
     pub noise: Noise,
-    /// Relative spread over placements and seeds.
-    pub sampling: f64,
+    /// Relative spread over placements and seeds; `None` if there was no time to see it.
+    pub sampling: Option<f64>,
     pub gauges: Vec<GaugeLine>,
     pub knobs: Vec<KnobLine>,
     /// All that ran, the scene's own settings first.
@@ -293,6 +295,7 @@ pub(super) mod tests {
             norm: "relative difference".into(),
             floor: 0.0,
             horizon: [1.0, 2.0],
+            shortened: vec![],
             reference: ReferenceLine {
                 kind: Kind::Extrapolated,
                 value: Some(1.0),
@@ -300,7 +303,7 @@ pub(super) mod tests {
                 rate: Some(2.0),
             },
             noise: Noise { cpu: 0.0, wall: 0.0, repeats: 3 },
-            sampling: 1e-3,
+            sampling: Some(1e-3),
             gauges: vec![],
             knobs: vec![],
             entries: vec![

@@ -176,6 +176,9 @@ impl Took {
 /// Seconds that this thread has spent on a processor: what others do on the machine does not
 /// count. `None` where the system does not tell.
 pub fn thread_seconds() -> Option<f64> {
+    // The kernel brings its account up to date when a thread yields, else with its tick of some
+    // milliseconds.
+    std::thread::yield_now();
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let ns: f64 = text.split_whitespace().next()?.parse().ok()?;
     (ns > 0.0).then_some(ns * 1e-9)

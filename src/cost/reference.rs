@@ -6,13 +6,17 @@
 //! r^p = |q1 - q0| / |q2 - q1|        q* = q2 + (q2 - q1)/(r^p - 1)        (Richardson)
 //! ```
 //! Where the differences shrink at a believable rate, `q*` is the reference and half of what was
-//! added to `q2` its uncertainty; else `q2` is, and its uncertainty is the larger difference.
+//! added to `q2` its uncertainty (rates above 2 are taken as 2); else `q2` is, and its uncertainty is the larger difference.
 
 use super::measure::Target;
 use serde::{Deserialize, Serialize};
 
 /// Rates that are believed.
 const RATES: [f64; 2] = [0.5, 4.5];
+
+/// Extrapolation takes no faster rate than this: three rungs often seem to converge faster than
+/// they do, and a fast rate would call its own result certain.
+const FASTEST: f64 = 2.0;
 
 /// Where the reference is from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -64,7 +68,7 @@ impl Reference {
         }
         match rate {
             Some(p) if (RATES[0]..=RATES[1]).contains(&p) => {
-                let more = 1.0 / (ratio.powf(p) - 1.0);
+                let more = 1.0 / (ratio.powf(p.min(FASTEST)) - 1.0);
                 let value: Vec<f64> =
                     q2.iter().zip(q1).map(|(fine, coarse)| fine + more * (fine - coarse)).collect();
                 let scale = target.size(value.iter().copied()).max(target.floor);

@@ -142,7 +142,10 @@ pub fn markdown(list: &List) -> String {
         out += &format!(", to no less than {:e} (SI)", list.floor);
     }
     out += &format!(", against {}\n", reference(list));
-    out += &format!("- sampling (other placements, seeds): {}\n", percent(list.sampling));
+    out += &format!(
+        "- sampling (other placements, seeds): {}\n",
+        list.sampling.map_or("not seen in the time".into(), percent)
+    );
     out += &format!("- measured: {}\n", horizon(list));
     out += &format!("- machine: {}\n", provenance(list));
     out += &format!("- made in {}\n\n**{}**\n\n", seconds(list.made_in), slogan(list));

@@ -44,8 +44,8 @@ impl Effort {
     fn limits(self) -> Limits {
         match self {
             Effort::Quick => Limits {
-                base: 1.3,
-                total: 85.0,
+                base: 1.2,
+                total: 95.0,
                 ratio: 1.5,
                 factors: &[0.5, FRAC_1_SQRT_2, 1.0, 1.2],
                 factors_exact: &[0.25, 0.5, FRAC_1_SQRT_2, 1.0, SQRT_2, 2.0],
@@ -66,7 +66,7 @@ impl Effort {
 }
 
 /// Repeats of runs that take less than these seconds: short ones are noisier and cost nothing.
-const REPEATS: [(f64, usize); 3] = [(0.1, 5), (0.4, 3), (2.0, 2)];
+const REPEATS: [(f64, usize); 3] = [(0.1, 5), (0.4, 3), (1.0, 2)];
 
 /// Seeds whose spread is the sampling error.
 const SEEDS: [u64; 3] = [11, 12, 13];
@@ -134,12 +134,14 @@ pub fn price(
     let pilot = Pilot::run(plan.clone(), 0.5 * limits.base)?;
     let mut horizon = full;
     let mut short = source.clone();
+    let mut cuts = vec![];
     if target.at != Moment::Start && pilot.whole() > limits.base {
         let share = (limits.base - pilot.start) / (pilot.whole() - pilot.start);
         let least = 6.0 / pilot.steps.max(6.0);
         let (sets, end) = shortened(&scene, share.max(least))?;
         short = source.with_sets(&sets)?;
         horizon = end;
+        cuts = sets;
     }
     let exact = exact_of(&scene).filter(|_| target.is_field());
     let factors = if exact.is_some() { limits.factors_exact } else { limits.factors };
@@ -172,8 +174,12 @@ pub fn price(
         }
         None => survey.ladder(&scene, &base, &mut gauges)?,
     };
-    survey.one_by_one()?;
     let (sampling, gauge_sampling) = survey.sampling(&scene, &plan, &reference)?;
+    // Combinations are what is sold: single knobs leave them time.
+    let total = survey.limits.total;
+    survey.limits.total = 0.75 * total;
+    survey.one_by_one()?;
+    survey.limits.total = total;
     for _ in 0..survey.limits.rounds {
         survey.combine(&reference)?;
     }
@@ -202,6 +208,7 @@ pub fn price(
         norm: survey.target.norm_title().into(),
         floor: survey.target.floor,
         horizon: [if survey.target.at == Moment::Start { 0.0 } else { horizon }, full],
+        shortened: cuts,
         reference: ReferenceLine {
             kind: reference.kind,
             value: (!survey.target.is_field()).then(|| reference.value[0]),
@@ -342,7 +349,8 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// Every knob around the scene's own settings, cheap ones first.
+    /// Every knob around the scene's own settings: finer ones first, which tell what is left of the
+    /// error, then cheap ones first.
     fn one_by_one(&mut self) -> Result<(), CostError> {
         let base = self.ran[0].sample.took.wall;
         let mut list = vec![];
@@ -350,11 +358,12 @@ impl Survey<'_> {
             for (l, level) in knob.levels.iter().enumerate() {
                 // Cells count to the power two, and once more for the steps.
                 let guess = base * level.size.map_or(1.5, |h| h.powf(-2.5).clamp(0.1, 30.0));
-                list.push((self.design.one(k, l), guess));
+                let finer = level.size.is_some_and(|h| h < 1.0);
+                list.push((self.design.one(k, l), guess, finer));
             }
         }
-        list.sort_by(|a, b| a.1.total_cmp(&b.1));
-        list.into_iter().try_for_each(|(settings, guess)| self.candidate(settings, guess))
+        list.sort_by(|a, b| b.2.cmp(&a.2).then(a.1.total_cmp(&b.1)));
+        list.into_iter().try_for_each(|(settings, guess, _)| self.candidate(settings, guess))
     }
 
     /// Spread over other placements of particles and other random directors, relative; of the
@@ -364,13 +373,13 @@ impl Survey<'_> {
         scene: &Scene,
         plan: &Plan,
         reference: &Reference,
-    ) -> Result<(f64, Vec<f64>), CostError> {
+    ) -> Result<(Option<f64>, Vec<f64>), CostError> {
         let e = &plan.effects;
         if plan.state.materials.len() < 2
             && !(e.directors || e.carried_viscosity || e.carried_density)
         {
             // All particles are alike: where they are makes no difference.
-            return Ok((0.0, vec![]));
+            return Ok((Some(0.0), vec![]));
         }
         let mut found: Vec<Sample> = vec![];
         for seed in SEEDS {
@@ -387,7 +396,7 @@ impl Survey<'_> {
             }
         }
         if found.len() < 2 {
-            return Ok((0.0, vec![]));
+            return Ok((None, vec![]));
         }
         let n = found.len() as f64;
         // Standard deviation about the mean, in the norm of the quantity.
@@ -405,7 +414,7 @@ impl Survey<'_> {
             .map(|k| spread(&|s| vec![s.gauges[k]], found[0].gauges[k].abs()))
             .collect();
         (self.say)(&format!("  sampling: {:.2e} over {} seeds", all, found.len()));
-        Ok((all, gauges))
+        Ok((Some(all), gauges))
     }
 
     fn ran(&self, settings: &[usize]) -> Option<&Sample> {
