@@ -103,9 +103,12 @@ impl Bought {
         let gauges = run.plan().gauges.iter().zip(&run.row().gauges).enumerate();
         let bars = gauges.map(|(k, (plan, now))| {
             let line = self.list.gauges.get(k);
-            let error = self.entry.gauge_errors.get(k).copied().unwrap_or(self.entry.promised);
-            let error = error.max(self.entry.promised.min(error * 2.0));
-            let error = error + line.map_or(0.0, |l| l.uncertainty);
+            let measured = self.entry.gauge_errors.get(k).copied();
+            // The gauge that the list is about has what was promised of it.
+            let error = match (line, measured) {
+                (Some(l), Some(e)) if !l.priced => e + l.uncertainty,
+                _ => self.entry.promised,
+            };
             let sampling = line.map_or(0.0, |l| l.sampling);
             (plan.name.clone(), [error, sampling].map(|e| e * now.volume.abs()))
         });

@@ -45,6 +45,9 @@ pub fn fit(finest: f64, differences: &[(f64, f64)], expected: f64) -> Option<Pow
     tried.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(power, _)| power)
 }
 
+/// Less than this share of an error is no gain that anyone would pay for.
+const GAIN: f64 = 0.03;
+
 /// Indices that no other index beats in both error and seconds, ascending in seconds.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> =
@@ -54,7 +57,7 @@ pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     });
     let mut best = f64::INFINITY;
     order.retain(|&i| {
-        let better = points[i].0 < best;
+        let better = points[i].0 < (1.0 - GAIN) * best;
         if better {
             best = points[i].0;
         }
@@ -63,8 +66,12 @@ pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     order
 }
 
+/// Nearer points of a front say nothing about a slope.
+const APART: f64 = 0.75;
+
 /// Seconds that halving the error adds to each point `(error, seconds)` of a front, by the slope
-/// `d ln seconds / d ln error` to the next one; the last takes the slope to the one before.
+/// `d ln seconds / d ln error` to the next one that is clearly better; the last ones take the slope
+/// from the one before that is clearly worse.
 pub fn next_halving(front: &[(f64, f64)]) -> Vec<Option<f64>> {
     let slope = |a: (f64, f64), b: (f64, f64)| {
         let s = (b.1 / a.1).ln() / (a.0 / b.0).ln();
@@ -72,12 +79,13 @@ pub fn next_halving(front: &[(f64, f64)]) -> Vec<Option<f64>> {
     };
     (0..front.len())
         .map(|i| {
-            let s = if i + 1 < front.len() {
-                slope(front[i], front[i + 1])
-            } else if i > 0 {
-                slope(front[i - 1], front[i])
-            } else {
-                None
+            let here = front[i];
+            let next = front[i + 1..].iter().find(|f| f.0 <= APART * here.0);
+            let before = front[..i].iter().rev().find(|f| here.0 <= APART * f.0);
+            let s = match (next, before) {
+                (Some(&next), _) => slope(here, next),
+                (None, Some(&before)) => slope(before, here),
+                (None, None) => None,
             }?;
             let more = front[i].1 * (s.exp2() - 1.0);
             more.is_finite().then_some(more)

@@ -77,6 +77,8 @@ pub struct Noise {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GaugeLine {
     pub name: String,
+    /// Its volume is what the list is about.
+    pub priced: bool,
     /// Relative, of the reference's volume.
     pub uncertainty: f64,
     /// Relative.
@@ -101,8 +103,9 @@ pub struct Entry {
     pub sets: Vec<String>,
     /// Measured against the reference, relative.
     pub error: f64,
-    /// What is promised: no less than half of what the largest knob adds, plus the reference's
-    /// uncertainty: errors of different sign may cancel, and nobody can rely on that.
+    /// What is promised. Against an exact solution the measured error; else no less than the root
+    /// of the sum of squares of what the knobs add, plus the reference's uncertainty: errors of
+    /// different sign may cancel, and nobody can rely on that.
     pub promised: f64,
     /// The measured error is far below what the knobs add: they cancel.
     pub lucky: bool,

@@ -177,9 +177,10 @@ pub fn markdown(list: &List) -> String {
         ],
         list.front().map(row).collect(),
     );
-    out += "\nAccuracy is what is promised: the measured error, no less than half of what the \
-            limiting knob adds, and the reference's uncertainty. A star marks errors that are small \
-            because those of several knobs cancel.\n";
+    out += "\nAccuracy is what is promised: against an exact solution the measured error; else no less \
+            than the root of the sum of squares of what the knobs add, plus the reference's \
+            uncertainty. A star marks measured errors that are small because those of several knobs \
+            cancel.\n";
     out += &knobs(list);
     out += &nobody(list);
     for (what, lines) in [("Failed", &list.failed), ("Left out to keep the time", &list.skipped)] {

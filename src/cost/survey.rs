@@ -5,10 +5,10 @@ use super::front::{self, Offer, Power};
 use super::knobs::{Design, rung};
 use super::list::{Entry, GaugeLine, KnobLine, List, Machine, Noise, ReferenceLine, SCHEMA};
 use super::measure::{Pilot, Sample, Target, run};
-use super::reference::Reference;
+use super::reference::{Kind, Reference};
 use crate::cases::exact_of;
 use crate::plan::{Plan, resolve};
-use crate::scene::{Moment, Placement, Scene, SceneSource, Scope, parse};
+use crate::scene::{Interesting, Moment, Placement, Scene, SceneSource, Scope, parse};
 use crate::sim::SimError;
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use std::sync::Arc;
@@ -104,7 +104,7 @@ fn planned(source: &SceneSource, sets: &[String]) -> Result<Arc<Plan>, CostError
 fn shortened(scene: &Scene, share: f64) -> Result<(Vec<String>, f64), CostError> {
     let end = scene.time.end.eval(&Scope::new(scene)?)?;
     let frames = f64::from(scene.recording.frames);
-    let kept = (frames * share).ceil().max(1.0);
+    let kept = (frames * share).round().max(1.0);
     // A whole number of intervals, so that frames stop the steps as they do in the scene.
     let share = if frames > 1.0 { (kept / frames).min(1.0) } else { share };
     if share >= 1.0 {
@@ -192,6 +192,7 @@ pub fn price(
     let gauge_lines = names
         .enumerate()
         .map(|(k, name)| GaugeLine {
+            priced: survey.target.quantity == Interesting::Gauge(name.clone()),
             name,
             uncertainty: gauges.get(k).map_or(0.0, |r: &Reference| r.uncertainty),
             sampling: gauge_sampling.get(k).copied().unwrap_or(0.0),
@@ -315,8 +316,7 @@ impl Survey<'_> {
             (self.say)(&format!("  {label}: {:.3} s of processor", sample.took.cpu));
             rungs.push(sample);
         }
-        let counter =
-            Target { quantity: crate::scene::Interesting::MaxSpeed, ..self.target.clone() };
+        let counter = Target { quantity: Interesting::MaxSpeed, ..self.target.clone() };
         for k in 0..base.gauges.len() {
             let [q0, q1, q2] = [&rungs[0], base, &rungs[1]].map(|s| [s.gauges[k]]);
             gauges.push(Reference::ladder([&q0, &q1, &q2], ratio, &counter));
@@ -543,13 +543,16 @@ impl Survey<'_> {
                 let s = &r.sample;
                 let error = self.error(s, reference);
                 let split = self.split(&r.settings, &adds);
-                let half = 0.5 * split.first().map_or(0.0, |s| s.1);
+                let trusted = match reference.kind {
+                    Kind::Exact => error,
+                    _ => split.iter().map(|s| s.1 * s.1).sum::<f64>().sqrt(),
+                };
                 Entry {
                     label: self.design.label(&r.settings),
                     sets: self.design.sets(&r.settings),
                     error,
-                    promised: error.max(half) + reference.uncertainty,
-                    lucky: error < 0.5 * half,
+                    promised: error.max(trusted) + reference.uncertainty,
+                    lucky: error < 0.4 * trusted,
                     cpu: s.took.cpu,
                     wall: s.took.wall,
                     repeats: r.repeats,
