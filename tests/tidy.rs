@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the house, ground floor first, and what each may import.
-const ROOMS: [(&str, &[&str]); 14] = [
+const ROOMS: [(&str, &[&str]); 15] = [
     ("testing", &[]),
     ("laws", &[]),
     ("frame", &[]),
@@ -16,9 +16,10 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("sim", &["laws", "frame", "scene", "space", "plan", "solve", "motion"]),
     ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
     ("verify", &["scene", "plan", "sim", "cases"]),
+    ("cost", &["scene", "space", "plan", "sim", "cases", "testing"]),
     ("record", &["frame", "scene", "space", "plan", "sim"]),
     ("stress", &["scene", "plan", "sim", "cases", "verify", "space"]),
-    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "stress", "record"]),
+    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "cost", "stress", "record"]),
 ];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {

@@ -1,8 +1,11 @@
 //! The command line: the top floor, which nothing imports.
 
 mod check;
+mod cost;
+mod cost_page;
 mod plan;
 mod presets;
+mod purchase;
 mod run;
 mod stress;
 mod verify;
@@ -73,6 +76,8 @@ enum Command {
     Verify(verify::Args),
     /// Run hostile scenes, and print a verdict for each
     Stress(stress::Args),
+    /// Measure what accuracy costs: a price list of settings
+    Cost(cost::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -170,6 +175,7 @@ pub fn main() -> ExitCode {
         Command::Presets(args) => presets::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Stress(args) => stress::run(&args),
+        Command::Cost(args) => cost::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

@@ -1,5 +1,6 @@
 //! `grainscope run`: a scene goes in, a recording, tables and plots come out.
 
+use super::purchase::{self, Bought};
 use super::{Failure, print};
 use crate::frame::Frame;
 use crate::plan::Plan;
@@ -27,6 +28,12 @@ pub struct Args {
     /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
+    /// Buy the cheapest settings that reach this accuracy (1%, 0.003) from `grainscope cost`
+    #[arg(long, value_name = "ERROR", value_parser = purchase::accuracy)]
+    accuracy: Option<f64>,
+    /// Buy the most accurate settings that end within this time (30s, 2min); a ceiling
+    #[arg(long, value_name = "TIME", value_parser = purchase::budget, conflicts_with = "accuracy")]
+    budget: Option<f64>,
     /// Folder of the run [default: runs/<scene name>, numbered if taken]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -37,7 +44,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
     /// Stop at this time (s); shortens the scene's time.end
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", conflicts_with_all = ["accuracy", "budget"])]
     until: Option<String>,
     /// Write the recording here instead of into the folder
     #[arg(long, value_name = "PATH", conflicts_with = "no_recording")]
@@ -67,6 +74,8 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
+    let bought = purchase::buy(&source, args.accuracy, args.budget)?;
+    let source = bought.as_ref().map_or(Ok(source.clone()), |b| source.with_sets(&b.entry.sets))?;
     let (scene, plan) = match &args.until {
         None => super::resolve(&source)?,
         Some(text) => {
@@ -82,7 +91,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let clock = Instant::now();
     let run = sim::start(plan.clone())?;
     let folder = folder::create(&scene.name, args.out.as_deref(), args.force)?;
-    let session = Session::open(args, &plan, run, folder, clock, interrupted)?;
+    let mut session = Session::open(args, &plan, run, folder, clock, interrupted)?;
+    session.bought = bought;
     session.go()
 }
 
@@ -142,6 +152,7 @@ struct Session {
     steps: Option<u64>,
     json: bool,
     profile: bool,
+    bought: Option<Bought>,
 }
 
 impl Session {
@@ -218,6 +229,7 @@ impl Session {
             steps: args.steps,
             json: args.json,
             profile: args.profile,
+            bought: None,
         })
     }
 
@@ -258,7 +270,7 @@ impl Session {
     fn compute(&mut self, progress: impl FnMut(u64, f64)) -> Result<Ending, Failure> {
         let outcome = self.steps(progress);
         // A run that ends between two frames still shows where it ended.
-        if let (Ok(Ending::StepLimit | Ending::Interrupted), Some(logger)) =
+        if let (Ok(Ending::StepLimit | Ending::Interrupted | Ending::BudgetSpent), Some(logger)) =
             (&outcome, &mut self.logger)
         {
             let wall = self.clock.elapsed().as_secs_f64();
@@ -278,6 +290,9 @@ impl Session {
             }
             if self.steps.is_some_and(|n| self.run.row().step >= n) {
                 return Ok(Ending::StepLimit);
+            }
+            if self.bought.as_ref().is_some_and(|b| b.is_spent(&self.clock, self.run.row().wall)) {
+                return Ok(Ending::BudgetSpent);
             }
             self.run.step()?;
             let events = self.run.events().to_vec();
@@ -358,6 +373,8 @@ impl Session {
             self.folder.display().to_string(),
             self.recording.as_ref().map(|p| p.display().to_string()),
         );
+        summary.purchase =
+            self.bought.as_ref().map(|b| b.receipt(self.run.as_ref(), self.tally.wall));
         let failure = match (outcome, fault) {
             (_, Some(e)) => Some(e),
             (Err(e), None) => Some(e),
@@ -448,6 +465,7 @@ impl Session {
         let ending = match s.ending {
             Ending::Finished => "finished",
             Ending::StepLimit => "stopped at the step limit",
+            Ending::BudgetSpent => "stopped because the budget is spent",
             Ending::Interrupted => "interrupted",
             Ending::Failed => "failed",
         };
@@ -461,6 +479,9 @@ impl Session {
         for (name, g) in &s.gauges {
             out +=
                 &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
+        }
+        if let Some(p) = &s.purchase {
+            out += &purchase::receipt_text(p);
         }
         let drift = s.volume_drift.values().map(|d| d.abs()).fold(0.0, f64::max);
         out += &format!(

@@ -7,8 +7,8 @@ use super::units::power_of_two;
 use super::*;
 use crate::laws::{cosserat, granular};
 use crate::scene::{
-    self, BoundaryKind, Change, Direction, Field, GradingTarget, Quantity, SceneError, Scope,
-    Shape, WallKind, closest,
+    self, BoundaryKind, Change, Direction, Field, GradingTarget, Interesting, Moment, Quantity,
+    SceneError, Scope, Shape, WallKind, closest,
 };
 use crate::space::mesh::Axis;
 use crate::space::walls::Obstacle;
@@ -578,6 +578,7 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
 
     let walls = Walls::new(scene, scope, domain)?;
     let gauges = gauges(scene, scope, domain)?;
+    interest(scene)?;
     let mesh = Arc::new(mesh(scene, scope, domain, length, &walls, &gauges, &units)?);
     let sides = sides(scene, scope, domain)?;
     let boundary = boundary(sides, &walls, &mesh, &units, &state)?;
@@ -912,6 +913,37 @@ fn gauges(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Vec<SiG
         });
     }
     Ok(list)
+}
+
+/// Checks what the scene is made for against what it has.
+fn interest(scene: &Scene) -> Result<()> {
+    let Some(i) = &scene.interest else { return Ok(()) };
+    let fault = |what: String, help: &str| Err(SceneError::new(format!("interest: {what}"), help));
+    if let Interesting::Gauge(name) | Interesting::Rate(name) = &i.quantity
+        && !scene.gauges.iter().any(|g| g.name == *name)
+    {
+        let names: Vec<&str> = scene.gauges.iter().map(|g| g.name.as_str()).collect();
+        let meant = closest(name, names.iter().copied());
+        let help = match meant {
+            Some(meant) => format!("did you mean `{meant}`?"),
+            None => format!("gauges of this scene: {}", names.join(", ")),
+        };
+        return fault(format!("there is no gauge `{name}`"), &help);
+    }
+    let field =
+        matches!(i.quantity, Interesting::Velocity | Interesting::Rotation | Interesting::Pressure);
+    if field && i.at == Moment::Peak {
+        return fault("a field has no peak".into(), "give at = \"start\" or at = \"end\"");
+    }
+    if i.quantity == Interesting::Alignment
+        && !scene.materials.values().any(|m| m.layer_viscosity.is_some())
+    {
+        return fault(
+            "nothing has directors whose alignment could be read".into(),
+            "give a material a layer_viscosity, or be interested in something else",
+        );
+    }
+    Ok(())
 }
 
 fn mesh(

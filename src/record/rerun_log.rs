@@ -16,6 +16,7 @@
 
 mod bar;
 mod blueprint;
+mod race;
 mod sinks;
 
 use std::collections::{HashMap, HashSet};
@@ -26,6 +27,7 @@ use rerun::archetypes;
 use rerun::components::{Color, MagnificationFilter, Radius};
 use rerun::{EntityPath, EntityPathPart, RecordingStream};
 
+pub use race::Race;
 pub use sinks::{Saved, Sink};
 
 use crate::frame::{
@@ -214,12 +216,27 @@ impl RerunLog {
         rec.set_log_time_enabled(false);
         rec.set_log_tick_enabled(false);
 
-        let paths = Paths::new(&info.name);
-        blueprint::send(&rec, info, &paths)?;
+        blueprint::send(&rec, info, &Paths::new(&info.name))?;
         rec.send_recording_name(info.name.as_str())?;
-        let mut log = Self {
+        let mut log = Self::of(rec, info);
+        log.files = to.files;
+        log.viewers = to.viewers;
+        log.page = to.page;
+        log.world(info)?;
+        log.texts(info)?;
+        log.curves(info)?;
+        // A viewer that is absent from the start is a mistake in the command; the check forgets it.
+        let wanted = log.viewers.clone();
+        log.check()?;
+        wanted.iter().try_for_each(Live::check)?;
+        Ok(log)
+    }
+
+    /// A run that goes to a stream, without destinations of its own.
+    fn of(rec: RecordingStream, info: &RunInfo) -> Self {
+        Self {
             rec,
-            paths,
+            paths: Paths::new(&info.name),
             domain: info.domain,
             quantities: (info.fields.iter())
                 .map(|field| (field.name.clone(), field.clone()))
@@ -229,9 +246,9 @@ impl RerunLog {
                 .filter(|plot| plot.log10)
                 .flat_map(|plot| plot.series.iter().map(|series| series.path.clone()))
                 .collect(),
-            files: to.files,
-            viewers: to.viewers,
-            page: to.page,
+            files: Vec::new(),
+            viewers: Vec::new(),
+            page: None,
             notices: Vec::new(),
             checked: Instant::now(),
             classes: Vec::new(),
@@ -239,15 +256,7 @@ impl RerunLog {
             scales: HashMap::new(),
             isolines: HashSet::new(),
             pictures: 0,
-        };
-        log.world(info)?;
-        log.texts(info)?;
-        log.curves(info)?;
-        // A viewer that is absent from the start is a mistake in the command; the check forgets it.
-        let wanted = log.viewers.clone();
-        log.check()?;
-        wanted.iter().try_for_each(Live::check)?;
-        Ok(log)
+        }
     }
 
     /// What to open in a browser, if the recording is served.

@@ -17,6 +17,8 @@ pub enum Ending {
     Finished,
     /// `--steps` was reached.
     StepLimit,
+    /// `--budget` was spent.
+    BudgetSpent,
     Interrupted,
     Failed,
 }
@@ -49,6 +51,25 @@ pub struct Summary {
     pub frames: FrameCounts,
     pub recording: Option<String>,
     pub warnings: Vec<String>,
+    /// What `--accuracy` or `--budget` bought.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub purchase: Option<Purchase>,
+}
+
+/// Settings bought from a price list, what was expected of them and what came.
+#[derive(Clone, Debug, Serialize)]
+pub struct Purchase {
+    pub settings: String,
+    pub sets: Vec<String>,
+    pub quantity: String,
+    /// Relative, of the discretisation.
+    pub accuracy: f64,
+    /// Relative; absent if it was not seen.
+    pub sampling: Option<f64>,
+    pub expected_seconds: f64,
+    pub seconds: f64,
+    /// Error bars of the gauges' volumes, m2: discretisation, sampling.
+    pub bars: IndexMap<String, [f64; 2]>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -182,6 +203,7 @@ impl Summary {
             },
             recording,
             warnings: tally.warnings.clone(),
+            purchase: None,
         }
     }
 }

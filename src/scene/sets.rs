@@ -6,7 +6,7 @@ use super::error::{SceneError, suggestion};
 use super::load::{SceneSource, table};
 
 /// The keys of a scene, as the first part of a path.
-const KEYS: [&str; 20] = [
+const KEYS: [&str; 21] = [
     "schema",
     "name",
     "description",
@@ -25,6 +25,7 @@ const KEYS: [&str; 20] = [
     "acceleration",
     "gauges",
     "dye",
+    "interest",
     "recording",
     "schedule",
 ];

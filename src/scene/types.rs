@@ -52,6 +52,10 @@ pub struct Scene {
     pub gauges: Vec<Gauge>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dye: Option<Dye>,
+    /// What the run is made for; `grainscope cost` prices its accuracy. Default: the volume through
+    /// the first gauge at the end; without gauges the velocity at the end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interest: Option<Interest>,
     #[serde(default)]
     pub recording: Recording,
     /// Changes of materials, gravity or parameters while the run goes on.
@@ -337,6 +341,70 @@ pub struct Gauge {
     pub material: String,
 }
 
+/// The quantity whose error counts, how that error is measured, and below what it does not matter.
+///
+/// The error is `|q - q_ref| / max(|q_ref|, floor)`, with `|.|` the norm over the domain for a
+/// field and the magnitude for a number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Interest {
+    pub quantity: Interesting,
+    #[serde(default)]
+    pub at: Moment,
+    #[serde(default)]
+    pub norm: Norm,
+    /// In the quantity's unit: errors are relative to no less than this.
+    #[serde(default = "zero")]
+    pub floor: Quantity,
+}
+
+/// What an accuracy may be asked of.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Interesting {
+    /// Volume that a gauge has counted, m2, by the gauge's name.
+    Gauge(String),
+    /// Rate at which a gauge counts, m2/s.
+    Rate(String),
+    /// m/s
+    RmsSpeed,
+    /// m/s
+    MaxSpeed,
+    /// Mean |n_x| of the directors.
+    Alignment,
+    /// W/m
+    Dissipation,
+    /// The field, m/s.
+    Velocity,
+    /// The field of the Cosserat rotation, 1/s.
+    Rotation,
+    /// The field, Pa; up to a constant where no side is open.
+    Pressure,
+}
+
+/// When the quantity is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Moment {
+    /// With the first solution.
+    Start,
+    #[default]
+    End,
+    /// Its largest magnitude over the run; only of numbers.
+    Peak,
+}
+
+/// How large a field is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Norm {
+    /// Root mean square over the domain.
+    #[default]
+    L2,
+    /// Largest magnitude.
+    Max,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
@@ -538,6 +606,9 @@ impl Default for Recording {
 
 fn zero_pair() -> [Quantity; 2] {
     [Quantity::number(0.0), Quantity::number(0.0)]
+}
+fn zero() -> Quantity {
+    Quantity::number(0.0)
 }
 fn zero_field() -> Field {
     Field::number(0.0)

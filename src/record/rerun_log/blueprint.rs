@@ -11,7 +11,7 @@ use rerun::datatypes::{Range1D, Range2D, Uuid};
 use rerun::external::re_log_types::BlueprintActivationCommand;
 use rerun::external::re_sdk_types::blueprint::{archetypes, components};
 
-use super::{APPLICATION, Paths, RecordError, SIM_TIME, bar};
+use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, bar};
 use crate::frame::{Plot, Rect, RunInfo};
 use crate::record::color::PAPER;
 
@@ -28,8 +28,23 @@ pub(super) fn send(
     info: &RunInfo,
     paths: &Paths,
 ) -> Result<(), RecordError> {
+    lay_out(rec, &info.recording_id, SIM_TIME, |writer| writer.run(info, paths))
+}
+
+/// Sends the layout of runs side by side, on the timeline of seconds computed.
+pub(super) fn send_race(rec: &RecordingStream, infos: &[RunInfo]) -> Result<(), RecordError> {
+    let id = infos.first().map_or("race", |info| info.recording_id.as_str());
+    lay_out(rec, id, WALL_TIME, |writer| writer.race(infos))
+}
+
+fn lay_out(
+    rec: &RecordingStream,
+    id: &str,
+    timeline: &str,
+    write: impl FnOnce(&mut Writer) -> Result<Node, RecordError>,
+) -> Result<(), RecordError> {
     let (layout, storage) = rerun::RecordingStreamBuilder::new(APPLICATION)
-        .recording_id(format!("{}-layout", info.recording_id))
+        .recording_id(format!("{id}-layout"))
         .blueprint()
         .enabled(true)
         .memory()?;
@@ -38,7 +53,7 @@ pub(super) fn send(
     layout.set_time_sequence("blueprint", 0);
 
     let mut writer = Writer { rec: &layout, count: 0 };
-    let root = writer.run(info, paths)?;
+    let root = write(&mut writer)?;
     layout.log(
         "viewport",
         &archetypes::ViewportBlueprint::new()
@@ -56,7 +71,7 @@ pub(super) fn send(
         "time_panel",
         &archetypes::TimePanelBlueprint::new()
             .with_state(components::PanelState::Collapsed)
-            .with_timeline(SIM_TIME)
+            .with_timeline(timeline)
             .with_play_state(components::PlayState::Following),
     )?;
 
@@ -118,6 +133,34 @@ impl Writer<'_> {
             }
             self.stack(components::ContainerKind::Horizontal, &columns, &shares)
         }
+    }
+
+    /// A column for each run, their first plot below.
+    fn race(&mut self, infos: &[RunInfo]) -> Result<Node, RecordError> {
+        let mut lanes = vec![];
+        let mut contents = vec![];
+        for info in infos {
+            let paths = Paths::new(&info.name);
+            let flow = ["+ $origin/world/**", "- $origin/world/fields/**"];
+            let seen = bar::seen(info.domain, bar::Room::Large);
+            let mut lane = vec![self.space(&info.name, &paths, &flow, seen)?];
+            lane.extend(self.fields(info, &paths)?.into_iter().take(1));
+            lanes.push(self.stack(components::ContainerKind::Vertical, &lane, &[])?);
+            let series = info.plots.iter().take(1).flat_map(|plot| &plot.series);
+            contents.extend(series.map(|s| format!("+ {}", paths.curve(&s.path, false))));
+        }
+        let lanes = self.stack(components::ContainerKind::Horizontal, &lanes, &[])?;
+        let Some(plot) = infos.first().and_then(|info| info.plots.first()) else {
+            return Ok(lanes);
+        };
+        let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
+        let view = self.view("TimeSeries", &plot.title, "/", &contents)?;
+        self.property(
+            &view,
+            "PlotLegend",
+            &archetypes::PlotLegend::new().with_corner(components::Corner2D::RightBottom),
+        )?;
+        self.stack(components::ContainerKind::Vertical, &[lanes, view], &[3.0, 1.0])
     }
 
     fn flow(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {

@@ -1,0 +1,167 @@
+//! `run --accuracy` and `run --budget`: settings bought from a price list.
+
+use super::{Failure, cost};
+use crate::cost::report::{percent, seconds};
+use crate::cost::{Entry, List};
+use crate::record::summary::Purchase;
+use crate::scene::SceneSource;
+use crate::sim::Run;
+use std::time::Instant;
+
+/// Reads `1%`, `0.3 %` or `0.01`.
+pub fn accuracy(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.trim().strip_suffix('%') {
+        Some(number) => (number, 0.01),
+        None => (text, 1.0),
+    };
+    match number.trim().parse::<f64>() {
+        Ok(v) if v > 0.0 && v * unit < 1.0 => Ok(v * unit),
+        _ => Err("give an error above 0 and below 100 %, such as 1% or 0.003".into()),
+    }
+}
+
+/// Reads `30s`, `500ms`, `2min`, `1.5h` or a number of seconds.
+pub fn budget(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let units = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0), ("", 1.0)];
+    let found = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, unit)));
+    match found.map(|(number, unit)| (number.trim().parse::<f64>(), unit)) {
+        Some((Ok(v), unit)) if v > 0.0 && v.is_finite() => Ok(v * unit),
+        _ => Err("give a time such as 30s, 500ms, 2min or 1h".into()),
+    }
+}
+
+/// What was bought.
+pub struct Bought {
+    pub entry: Entry,
+    list: List,
+    /// Seconds, if that was the wish.
+    budget: Option<f64>,
+}
+
+/// Buys settings, says what is expected of them, and refuses what is out of reach.
+pub fn buy(
+    source: &SceneSource,
+    accuracy: Option<f64>,
+    budget: Option<f64>,
+) -> Result<Option<Bought>, Failure> {
+    if accuracy.is_none() && budget.is_none() {
+        return Ok(None);
+    }
+    let list = cost::to_buy_from(source)?;
+    let entry = match (accuracy, budget) {
+        (Some(wanted), _) => list.for_accuracy(wanted).map_err(|best| {
+            let best = best.map_or("there is nothing to buy".into(), |e| {
+                format!(
+                    "the best is {} for about {}: {}",
+                    percent(e.promised),
+                    seconds(list.expected_seconds(e)),
+                    e.label
+                )
+            });
+            let finer =
+                if list.quick { "; without --quick `grainscope cost` looks further" } else { "" };
+            format!("an accuracy of {} is out of reach; {best}{finer}", percent(wanted))
+        }),
+        (None, wanted) => {
+            let wanted = wanted.unwrap_or(f64::INFINITY);
+            list.for_budget(wanted).map_err(|fastest| {
+                let fastest = fastest.map_or("there is nothing to buy".into(), |e| {
+                    format!(
+                        "the fastest takes about {} for {}: {}",
+                        seconds(list.expected_seconds(e)),
+                        percent(e.promised),
+                        e.label
+                    )
+                });
+                format!("a budget of {} is too little; {fastest}", seconds(wanted))
+            })
+        }
+    };
+    let entry = entry.map_err(Failure::Usage)?.clone();
+    eprintln!(
+        "bought: {}; expects {} within {} (limited by {}{}), in about {}",
+        entry.label,
+        list.quantity,
+        percent(entry.promised),
+        entry.limiting(),
+        list.sampling.map_or(String::new(), |s| format!("; sampling {}", percent(s))),
+        seconds(list.expected_seconds(&entry))
+    );
+    Ok(Some(Bought { entry, list, budget }))
+}
+
+impl Bought {
+    /// Whether a further step, as long as the last one, would exceed the budget. Closing the files
+    /// takes some time too.
+    pub fn is_spent(&self, clock: &Instant, step: f64) -> bool {
+        self.budget.is_some_and(|b| clock.elapsed().as_secs_f64() + step > b)
+    }
+
+    /// What was expected and what came.
+    pub fn receipt(&self, run: &dyn Run, wall: f64) -> Purchase {
+        let gauges = run.plan().gauges.iter().zip(&run.row().gauges).enumerate();
+        let bars = gauges.map(|(k, (plan, now))| {
+            let line = self.list.gauges.get(k);
+            let measured = self.entry.gauge_errors.get(k).copied();
+            // The gauge that the list is about has what was promised of it.
+            let error = match (line, measured) {
+                (Some(l), Some(e)) if !l.priced => e + l.uncertainty,
+                _ => self.entry.promised,
+            };
+            let sampling = line.map_or(0.0, |l| l.sampling);
+            (plan.name.clone(), [error, sampling].map(|e| e * now.volume.abs()))
+        });
+        Purchase {
+            settings: self.entry.label.clone(),
+            sets: self.entry.sets.clone(),
+            quantity: self.list.quantity.clone(),
+            accuracy: self.entry.promised,
+            sampling: self.list.sampling,
+            expected_seconds: self.list.expected_seconds(&self.entry),
+            seconds: wall,
+            bars: bars.collect(),
+        }
+    }
+}
+
+/// What was bought, at the end of a run's report.
+pub fn receipt_text(p: &Purchase) -> String {
+    let mut out = format!(
+        "  bought {}: {} within {}; expected {}, took {}\n",
+        p.settings,
+        p.quantity,
+        percent(p.accuracy),
+        seconds(p.expected_seconds),
+        seconds(p.seconds)
+    );
+    for (name, [error, sampling]) in &p.bars {
+        out += &format!(
+            "  gauge {name}: +- {error:.2e} m2 (discretisation) +- {sampling:.2e} m2 (sampling)\n"
+        );
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wishes_are_read() {
+        for (text, value) in [("1%", 0.01), ("0.3 %", 0.003), ("0.02", 0.02)] {
+            assert!(accuracy(text).is_ok_and(|v| (v - value).abs() < 1e-15), "{text}");
+        }
+        for text in ["0", "-1%", "100%", "good", "nan"] {
+            assert!(accuracy(text).is_err(), "{text}");
+        }
+        for (text, value) in
+            [("30s", 30.0), ("500ms", 0.5), ("2min", 120.0), ("1h", 3600.0), ("7", 7.0)]
+        {
+            assert_eq!(budget(text), Ok(value), "{text}");
+        }
+        for text in ["0s", "soon", "-3s", "inf", "3 weeks"] {
+            assert!(budget(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,579 @@
+//! Making a price list: what is run, in which order, and when it is enough.
+
+use super::CostError;
+use super::front::{self, Offer, Power};
+use super::knobs::{Design, rung};
+use super::list::{Entry, GaugeLine, KnobLine, List, Machine, Noise, ReferenceLine, SCHEMA};
+use super::measure::{Pilot, Sample, Target, run};
+use super::reference::{Kind, Reference};
+use crate::cases::exact_of;
+use crate::plan::{Plan, resolve};
+use crate::scene::{Interesting, Moment, Placement, Scene, SceneSource, Scope, parse};
+use crate::sim::SimError;
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// Under two minutes: runs are shortened, combinations few.
+    Quick,
+    /// Whole runs where one takes less than half a minute.
+    Full,
+}
+
+/// Numbers that belong to an effort.
+struct Limits {
+    /// Seconds of the processor that a run with the scene's own settings may take: longer runs
+    /// are shortened. The whole list takes about forty of them.
+    base: f64,
+    /// Seconds of the wall after which nothing new is started.
+    total: f64,
+    /// Between the rungs of the ladder of references.
+    ratio: f64,
+    /// Of the cells, relative to the scene's own; all coarser than the finest rung.
+    factors: &'static [f64],
+    /// The same where the solution is exact and no reference has to be finer.
+    factors_exact: &'static [f64],
+    combinations: usize,
+    rounds: usize,
+}
+
+impl Effort {
+    fn limits(self) -> Limits {
+        match self {
+            Effort::Quick => Limits {
+                base: 1.2,
+                total: 95.0,
+                ratio: 1.5,
+                factors: &[0.5, FRAC_1_SQRT_2, 1.0, 1.2],
+                factors_exact: &[0.25, 0.5, FRAC_1_SQRT_2, 1.0, SQRT_2, 2.0],
+                combinations: 7,
+                rounds: 1,
+            },
+            Effort::Full => Limits {
+                base: 25.0,
+                total: 3600.0,
+                ratio: 2.0,
+                factors: &[0.25, 0.35, 0.5, FRAC_1_SQRT_2, 1.0, SQRT_2],
+                factors_exact: &[0.25, 0.35, 0.5, FRAC_1_SQRT_2, 1.0, SQRT_2, 2.0, 2.83, 4.0],
+                combinations: 12,
+                rounds: 2,
+            },
+        }
+    }
+}
+
+/// Repeats of runs that take less than these seconds: short ones are noisier and cost nothing.
+const REPEATS: [(f64, usize); 3] = [(0.1, 5), (0.4, 3), (1.0, 2)];
+
+/// Seeds whose spread is the sampling error.
+const SEEDS: [u64; 3] = [11, 12, 13];
+
+/// Errors below this are rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// A candidate that ran.
+struct Ran {
+    settings: Vec<usize>,
+    sample: Sample,
+    repeats: usize,
+}
+
+/// Everything at hand while a list is made.
+struct Survey<'a> {
+    source: SceneSource,
+    target: Target,
+    limits: Limits,
+    design: Design,
+    clock: Instant,
+    say: &'a mut dyn FnMut(&str),
+    ran: Vec<Ran>,
+    failed: Vec<String>,
+    skipped: Vec<String>,
+}
+
+/// Plans a source with sets.
+fn planned(source: &SceneSource, sets: &[String]) -> Result<Arc<Plan>, CostError> {
+    let source = source.with_sets(sets)?;
+    Ok(Arc::new(resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?))
+}
+
+/// Sets that end a scene at a share of its time, frames keeping their interval.
+fn shortened(scene: &Scene, share: f64) -> Result<(Vec<String>, f64), CostError> {
+    let end = scene.time.end.eval(&Scope::new(scene)?)?;
+    let frames = f64::from(scene.recording.frames);
+    let kept = (frames * share).round().max(1.0);
+    // A whole number of intervals, so that frames stop the steps as they do in the scene.
+    let share = if frames > 1.0 { (kept / frames).min(1.0) } else { share };
+    if share >= 1.0 {
+        return Ok((vec![], end));
+    }
+    let sets = vec![
+        format!("time.end={:e}", end * share),
+        format!("recording.frames={kept}"),
+        "recording.times=[]".into(),
+    ];
+    Ok((sets, end * share))
+}
+
+/// Makes the price list of a scene. `say` hears what is going on.
+pub fn price(
+    source: &SceneSource,
+    effort: Effort,
+    machine: Machine,
+    say: &mut dyn FnMut(&str),
+) -> Result<List, CostError> {
+    let clock = Instant::now();
+    let scene = parse(source)?;
+    let plan = planned(source, &[])?;
+    let target = Target::of(&scene).map_err(|e| e.with_source(source))?;
+    let limits = effort.limits();
+    let full = scene.time.end.eval(&Scope::new(&scene)?)?;
+    let pilot = Pilot::run(plan.clone(), 0.5 * limits.base)?;
+    let mut horizon = full;
+    let mut short = source.clone();
+    let mut cuts = vec![];
+    if target.at != Moment::Start && pilot.whole() > limits.base {
+        let share = (limits.base - pilot.start) / (pilot.whole() - pilot.start);
+        let least = 6.0 / pilot.steps.max(6.0);
+        let (sets, end) = shortened(&scene, share.max(least))?;
+        short = source.with_sets(&sets)?;
+        horizon = end;
+        cuts = sets;
+    }
+    let exact = exact_of(&scene).filter(|_| target.is_field());
+    let factors = if exact.is_some() { limits.factors_exact } else { limits.factors };
+    let design = Design::new(&scene, &plan, target.at, factors)?;
+    say(&format!(
+        "{}: {}; {} knobs; a whole run takes about {:.1} s of processor",
+        scene.name,
+        target.title(),
+        design.knobs.len(),
+        pilot.whole()
+    ));
+    let mut survey = Survey {
+        source: short,
+        target,
+        limits,
+        design,
+        clock,
+        say,
+        ran: vec![],
+        failed: vec![],
+        skipped: vec![],
+    };
+    let noise = survey.base()?;
+    let base = survey.ran[0].sample.clone();
+    let mut gauges = vec![];
+    let reference = match exact {
+        Some(exact) => {
+            let at = |p: [f64; 2]| ((exact.velocity)(p[0], p[1]), (exact.pressure)(p[0], p[1]));
+            Reference::exact(survey.target.field(&plan, at), &survey.target)
+        }
+        None => survey.ladder(&scene, &base, &mut gauges)?,
+    };
+    let (sampling, gauge_sampling) = survey.sampling(&scene, &plan, &reference)?;
+    // Combinations are what is sold: single knobs leave them time.
+    let total = survey.limits.total;
+    survey.limits.total = 0.75 * total;
+    survey.one_by_one()?;
+    survey.limits.total = total;
+    for _ in 0..survey.limits.rounds {
+        survey.combine(&reference)?;
+    }
+    let whole_run = match survey.target.at {
+        Moment::Start => pilot.whole() / base.took.cpu.max(1e-9),
+        _ if horizon < full => pilot.whole() / base.took.cpu.max(1e-9),
+        _ => 1.0,
+    };
+    let names = plan.gauges.iter().map(|g| g.name.clone());
+    let gauge_lines = names
+        .enumerate()
+        .map(|(k, name)| GaugeLine {
+            priced: survey.target.quantity == Interesting::Gauge(name.clone()),
+            name,
+            uncertainty: gauges.get(k).map_or(0.0, |r: &Reference| r.uncertainty),
+            sampling: gauge_sampling.get(k).copied().unwrap_or(0.0),
+        })
+        .collect();
+    let (knobs, entries, front) = survey.entries(&reference, &gauges);
+    Ok(List {
+        schema: SCHEMA,
+        scene: scene.name.clone(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        quick: effort == Effort::Quick,
+        machine,
+        quantity: survey.target.title(),
+        norm: survey.target.norm_title().into(),
+        floor: survey.target.floor,
+        horizon: [if survey.target.at == Moment::Start { 0.0 } else { horizon }, full],
+        shortened: cuts,
+        reference: ReferenceLine {
+            kind: reference.kind,
+            value: (!survey.target.is_field()).then(|| reference.value[0]),
+            uncertainty: reference.uncertainty,
+            rate: reference.rate,
+        },
+        noise,
+        sampling,
+        gauges: gauge_lines,
+        knobs,
+        entries,
+        front,
+        failed: survey.failed,
+        skipped: survey.skipped,
+        whole_run,
+        made_in: clock.elapsed().as_secs_f64(),
+    })
+}
+
+impl Survey<'_> {
+    fn elapsed(&self) -> f64 {
+        self.clock.elapsed().as_secs_f64()
+    }
+
+    /// Runs once; a failure of the run is a finding, one of the scene is not.
+    fn sample(&mut self, label: &str, sets: &[String]) -> Result<Option<Sample>, CostError> {
+        let plan = planned(&self.source, sets)?;
+        match run(plan, &self.target, |_, _| {}) {
+            Ok(sample) => Ok(Some(sample)),
+            Err(e @ SimError::Setup(_)) => Err(e.into()),
+            Err(e) => {
+                (self.say)(&format!("  {label}: {e}"));
+                self.failed.push(format!("{label}: {e}"));
+                Ok(None)
+            }
+        }
+    }
+
+    /// Runs as often as it pays, keeps the best, and gives all that was taken.
+    fn best_of(
+        &mut self,
+        label: &str,
+        sets: &[String],
+        least: usize,
+    ) -> Result<Option<(Sample, Vec<[f64; 2]>)>, CostError> {
+        let Some(mut best) = self.sample(label, sets)? else { return Ok(None) };
+        let mut took = vec![[best.took.cpu, best.took.wall]];
+        let more = REPEATS.iter().find(|(s, _)| best.took.cpu < *s).map_or(1, |r| r.1).max(least);
+        while took.len() < more {
+            let Some(again) = self.sample(label, sets)? else { break };
+            took.push([again.took.cpu, again.took.wall]);
+            best.took.wall = best.took.wall.min(again.took.wall);
+            if again.took.cpu < best.took.cpu {
+                best.took.cpu = again.took.cpu;
+                best.phases = again.phases;
+            }
+        }
+        (self.say)(&format!(
+            "  {label}: {:.3} s of processor, best of {}",
+            best.took.cpu,
+            took.len()
+        ));
+        Ok(Some((best, took)))
+    }
+
+    /// The scene's own settings, often enough to see the machine's noise.
+    fn base(&mut self) -> Result<Noise, CostError> {
+        let settings = self.design.base();
+        let label = self.design.label(&settings);
+        let Some((sample, took)) = self.best_of(&label, &[], 3)? else {
+            let why = self.failed.join("; ");
+            return Err(CostError::Useless(format!(
+                "the scene does not run with its own settings, so there is nothing to vary: {why}"
+            )));
+        };
+        let spread = |k: usize| {
+            let [low, high] = took
+                .iter()
+                .map(|t| t[k])
+                .fold([f64::INFINITY, 0.0], |[l, h], t| [f64::min(l, t), f64::max(h, t)]);
+            high / low.max(1e-9) - 1.0
+        };
+        let noise = Noise { cpu: spread(0), wall: spread(1), repeats: took.len() };
+        self.ran.push(Ran { settings, sample, repeats: took.len() });
+        Ok(noise)
+    }
+
+    /// The reference where nothing is exact: a coarser and a finer rung beside the scene's own.
+    fn ladder(
+        &mut self,
+        scene: &Scene,
+        base: &Sample,
+        gauges: &mut Vec<Reference>,
+    ) -> Result<Reference, CostError> {
+        let ratio = self.limits.ratio;
+        let mut rungs = vec![];
+        for (label, ratio) in [("coarse rung", 1.0 / ratio), ("reference", ratio)] {
+            let sets = rung(scene, ratio, self.target.at)?;
+            (self.say)(&format!("  {label}: {}", sets.join(" ")));
+            let Some(sample) = self.sample(label, &sets)? else {
+                let why = self.failed.join("; ");
+                return Err(CostError::Useless(format!("there is no reference: {why}")));
+            };
+            (self.say)(&format!("  {label}: {:.3} s of processor", sample.took.cpu));
+            rungs.push(sample);
+        }
+        let counter = Target { quantity: Interesting::MaxSpeed, ..self.target.clone() };
+        for k in 0..base.gauges.len() {
+            let [q0, q1, q2] = [&rungs[0], base, &rungs[1]].map(|s| [s.gauges[k]]);
+            gauges.push(Reference::ladder([&q0, &q1, &q2], ratio, &counter));
+        }
+        let values = [&rungs[0].value[..], &base.value, &rungs[1].value];
+        Ok(Reference::ladder(values, ratio, &self.target))
+    }
+
+    /// Whether there is time for a run of these seconds; notes what is left out.
+    fn allows(&mut self, label: &str, seconds: f64) -> bool {
+        let fits = self.elapsed() + seconds < self.limits.total;
+        if !fits {
+            self.skipped.push(label.to_string());
+        }
+        fits
+    }
+
+    fn candidate(&mut self, settings: Vec<usize>, guess: f64) -> Result<(), CostError> {
+        if self.ran.iter().any(|r| r.settings == settings) {
+            return Ok(());
+        }
+        let label = self.design.label(&settings);
+        if !self.allows(&label, guess) {
+            return Ok(());
+        }
+        let sets = self.design.sets(&settings);
+        if let Some((sample, took)) = self.best_of(&label, &sets, 1)? {
+            self.ran.push(Ran { settings, sample, repeats: took.len() });
+        }
+        Ok(())
+    }
+
+    /// Every knob around the scene's own settings: finer ones first, which tell what is left of the
+    /// error, then cheap ones first.
+    fn one_by_one(&mut self) -> Result<(), CostError> {
+        let base = self.ran[0].sample.took.wall;
+        let mut list = vec![];
+        for (k, knob) in self.design.knobs.iter().enumerate() {
+            for (l, level) in knob.levels.iter().enumerate() {
+                // Cells count to the power two, and once more for the steps.
+                let guess = base * level.size.map_or(1.5, |h| h.powf(-2.5).clamp(0.1, 30.0));
+                let finer = level.size.is_some_and(|h| h < 1.0);
+                list.push((self.design.one(k, l), guess, finer));
+            }
+        }
+        list.sort_by(|a, b| b.2.cmp(&a.2).then(a.1.total_cmp(&b.1)));
+        list.into_iter().try_for_each(|(settings, guess, _)| self.candidate(settings, guess))
+    }
+
+    /// Spread over other placements of particles and other random directors, relative; of the
+    /// quantity and of each gauge.
+    fn sampling(
+        &mut self,
+        scene: &Scene,
+        plan: &Plan,
+        reference: &Reference,
+    ) -> Result<(Option<f64>, Vec<f64>), CostError> {
+        let e = &plan.effects;
+        if plan.state.materials.len() < 2
+            && !(e.directors || e.carried_viscosity || e.carried_density)
+        {
+            // All particles are alike: where they are makes no difference.
+            return Ok((Some(0.0), vec![]));
+        }
+        let mut found: Vec<Sample> = vec![];
+        for seed in SEEDS {
+            let mut sets = vec![format!("accuracy.seed={seed}")];
+            if scene.accuracy.placement == Placement::Regular {
+                sets.push("accuracy.placement=jittered".into());
+            }
+            let guess = 1.2 * self.ran[0].sample.took.wall;
+            let label = format!("seed {seed}");
+            if self.allows(&label, guess)
+                && let Some(sample) = self.sample(&label, &sets)?
+            {
+                found.push(sample);
+            }
+        }
+        if found.len() < 2 {
+            return Ok((None, vec![]));
+        }
+        let n = found.len() as f64;
+        // Standard deviation about the mean, in the norm of the quantity.
+        let spread = |read: &dyn Fn(&Sample) -> Vec<f64>, scale: f64| {
+            let values: Vec<Vec<f64>> = found.iter().map(read).collect();
+            let mean: Vec<f64> = (0..values[0].len())
+                .map(|i| values.iter().map(|v| v[i]).sum::<f64>() / n)
+                .collect();
+            let squares: f64 =
+                values.iter().map(|v| self.target.distance(v, &mean, scale).powi(2)).sum();
+            (squares / (n - 1.0)).sqrt()
+        };
+        let all = spread(&|s| s.value.clone(), reference.scale);
+        let gauges = (0..found[0].gauges.len())
+            .map(|k| spread(&|s| vec![s.gauges[k]], found[0].gauges[k].abs()))
+            .collect();
+        (self.say)(&format!("  sampling: {:.2e} over {} seeds", all, found.len()));
+        Ok((Some(all), gauges))
+    }
+
+    fn ran(&self, settings: &[usize]) -> Option<&Sample> {
+        self.ran.iter().find(|r| r.settings == settings).map(|r| &r.sample)
+    }
+
+    fn error(&self, sample: &Sample, reference: &Reference) -> f64 {
+        let error = self.target.distance(&sample.value, &reference.value, reference.scale);
+        if error < ROUNDING { 0.0 } else { error }
+    }
+
+    /// What each setting of a knob adds to the error, and the power that says so.
+    fn adds(&self, knob: usize, reference: &Reference) -> (Vec<Option<f64>>, Option<Power>) {
+        let k = &self.design.knobs[knob];
+        let at = |l: usize| self.ran(&self.design.one(knob, l));
+        let between = |a: &Sample, b: &Sample| {
+            let d = self.target.distance(&a.value, &b.value, reference.scale);
+            if d < ROUNDING { 0.0 } else { d }
+        };
+        let measured: Vec<usize> = (0..k.levels.len()).filter(|&l| at(l).is_some()).collect();
+        let sized = k.levels.iter().all(|l| l.size.is_some());
+        if sized {
+            let size = |l: usize| k.levels[l].size.unwrap_or(1.0);
+            let finest = measured.iter().copied().min_by(|&a, &b| size(a).total_cmp(&size(b)));
+            let Some((finest, best)) = finest.and_then(|f| Some((f, at(f)?))) else {
+                return (vec![None; k.levels.len()], None);
+            };
+            let differences: Vec<(f64, f64)> =
+                measured.iter().filter_map(|&l| Some((size(l), between(at(l)?, best)))).collect();
+            let power = front::fit(size(finest), &differences, k.expected);
+            let adds = (0..k.levels.len())
+                .map(|l| {
+                    let found = at(l)?;
+                    // What was measured counts more than the curve, which adds what the finest
+                    // setting still has.
+                    let rest = power.map_or(0.0, |p| p.at(size(finest)));
+                    Some(between(found, best) + rest)
+                })
+                .collect();
+            return (adds, power);
+        }
+        // A choice: the one whose error is least adds nothing.
+        let best = match k.name {
+            // The scene's own is the finest of those tried.
+            "tolerance" => Some(k.base),
+            _ => measured.iter().copied().min_by(|&a, &b| {
+                let error = |l| at(l).map_or(f64::INFINITY, |s| self.error(s, reference));
+                error(a).total_cmp(&error(b))
+            }),
+        };
+        let best = best.and_then(at);
+        let adds = (0..k.levels.len()).map(|l| Some(between(at(l)?, best?))).collect();
+        (adds, None)
+    }
+
+    /// Runs what the model of errors and times calls a front.
+    fn combine(&mut self, reference: &Reference) -> Result<(), CostError> {
+        let base = self.ran[0].sample.took;
+        let mut offers: Vec<Vec<Offer>> = vec![];
+        // Levels that ran: indices of the model differ from those of the design.
+        let mut known: Vec<Vec<usize>> = vec![];
+        for (k, knob) in self.design.knobs.iter().enumerate() {
+            let (adds, _) = self.adds(k, reference);
+            let mut offer = vec![];
+            let mut levels = vec![];
+            for l in 0..knob.levels.len() {
+                let ran = self.ran(&self.design.one(k, l));
+                if let (Some(add), Some(sample)) = (adds[l], ran) {
+                    offer.push((add, sample.took.cpu / base.cpu.max(1e-9)));
+                    levels.push(l);
+                }
+            }
+            offers.push(offer);
+            known.push(levels);
+        }
+        let proposed: Vec<Vec<usize>> = front::model_front(&offers)
+            .into_iter()
+            .map(|m| m.iter().enumerate().map(|(k, &i)| known[k][i]).collect::<Vec<_>>())
+            .filter(|s| self.ran(s).is_none())
+            .collect();
+        for settings in front::spread(&proposed, self.limits.combinations) {
+            let ratio: f64 = settings
+                .iter()
+                .enumerate()
+                .filter_map(|(k, l)| known[k].iter().position(|m| m == l).map(|i| offers[k][i].1))
+                .product();
+            self.candidate(settings, base.wall * ratio)?;
+        }
+        Ok(())
+    }
+
+    /// What each knob adds to the error of a candidate, largest first.
+    fn split(&self, settings: &[usize], adds: &[Vec<Option<f64>>]) -> Vec<(String, f64)> {
+        let mut split: Vec<(String, f64)> = (self.design.knobs.iter().enumerate())
+            .map(|(k, knob)| (knob.name.to_string(), adds[k][settings[k]].unwrap_or(0.0)))
+            .collect();
+        split.sort_by(|a, b| b.1.total_cmp(&a.1));
+        split
+    }
+
+    fn entries(
+        &self,
+        reference: &Reference,
+        gauges: &[Reference],
+    ) -> (Vec<KnobLine>, Vec<Entry>, Vec<usize>) {
+        let found: Vec<_> = (0..self.design.knobs.len()).map(|k| self.adds(k, reference)).collect();
+        let knobs = self
+            .design
+            .knobs
+            .iter()
+            .zip(&found)
+            .map(|(knob, (adds, power))| KnobLine {
+                name: knob.name.into(),
+                adds: (knob.levels.iter().zip(adds))
+                    .filter_map(|(l, a)| Some((l.label.clone(), (*a)?)))
+                    .collect(),
+                rate: power.filter(|p| p.seen).map(|p| p.p),
+                misfit: power.filter(|p| p.seen).map(|p| p.misfit),
+            })
+            .collect();
+        let adds: Vec<Vec<Option<f64>>> = found.into_iter().map(|f| f.0).collect();
+        let mut entries: Vec<Entry> = self
+            .ran
+            .iter()
+            .map(|r| {
+                let s = &r.sample;
+                let error = self.error(s, reference);
+                let split = self.split(&r.settings, &adds);
+                let trusted = match reference.kind {
+                    Kind::Exact => error,
+                    _ => split.iter().map(|s| s.1 * s.1).sum::<f64>().sqrt(),
+                };
+                Entry {
+                    label: self.design.label(&r.settings),
+                    sets: self.design.sets(&r.settings),
+                    error,
+                    promised: error.max(trusted) + reference.uncertainty,
+                    lucky: error < 0.4 * trusted,
+                    cpu: s.took.cpu,
+                    wall: s.took.wall,
+                    repeats: r.repeats,
+                    steps: s.steps,
+                    unknowns: s.unknowns,
+                    particles: s.particles,
+                    phases: s.phases.list().map(|(n, t)| (n.to_string(), t)).to_vec(),
+                    split,
+                    gauge_errors: (gauges.iter().zip(&s.gauges))
+                        .map(|(g, v)| self.target.distance(&[*v], &g.value, g.scale))
+                        .collect(),
+                    next_halving: None,
+                }
+            })
+            .collect();
+        let points: Vec<(f64, f64)> = entries.iter().map(|e| (e.promised, e.cpu)).collect();
+        let front = front::front(&points);
+        let line: Vec<(f64, f64)> = front.iter().map(|&i| points[i]).collect();
+        for (&i, more) in front.iter().zip(front::next_halving(&line)) {
+            entries[i].next_halving = more;
+        }
+        (knobs, entries, front)
+    }
+}

@@ -1,0 +1,67 @@
+//! Several runs in one recording, side by side on the timeline of seconds computed: a race.
+
+use std::path::Path;
+
+use rerun::archetypes;
+
+use super::sinks::{Destinations, Sink};
+use super::{APPLICATION, Finished, RecordError, RerunLog, blueprint, on_dark, rgb};
+use crate::frame::{Frame, RunInfo};
+use crate::record::color::OKABE_ITO;
+
+/// A recording of runs that are computed one after the other and watched together.
+pub struct Race {
+    lanes: Vec<RerunLog>,
+}
+
+impl Race {
+    /// Starts a recording of runs, which need names of their own; the first one's identity is that
+    /// of the recording.
+    pub fn open(infos: &[RunInfo], title: &str, path: &Path) -> Result<Self, RecordError> {
+        let to = Destinations::open(&[Sink::Save(path.to_owned())])?;
+        let id = infos.first().map_or("race", |info| info.recording_id.as_str());
+        let rec = rerun::RecordingStreamBuilder::new(APPLICATION)
+            .recording_id(id)
+            .enabled(true)
+            .set_sinks(to.sinks)?;
+        rec.set_log_time_enabled(false);
+        rec.set_log_tick_enabled(false);
+        blueprint::send_race(&rec, infos)?;
+        rec.send_recording_name(title)?;
+        let mut lanes = Vec::new();
+        for (info, color) in infos.iter().zip(OKABE_ITO.iter().cycle()) {
+            let mut lane = RerunLog::of(rec.clone(), info);
+            lane.world(info)?;
+            lane.texts(info)?;
+            lane.curves(info)?;
+            for series in info.plots.iter().flat_map(|plot| &plot.series) {
+                // Curves of several runs share a plot: a colour tells the run.
+                lane.rec.log_static(
+                    lane.paths.curve(&series.path, false),
+                    &archetypes::SeriesLines::update_fields().with_colors([rgb(on_dark(*color))]),
+                )?;
+            }
+            lanes.push(lane);
+        }
+        if let Some(first) = lanes.first_mut() {
+            first.files = to.files;
+        }
+        Ok(Self { lanes })
+    }
+
+    /// Records an instant of one run.
+    pub fn frame(&mut self, lane: usize, frame: &Frame) -> Result<(), RecordError> {
+        self.lanes.get_mut(lane).map_or(Ok(()), |lane| lane.frame(frame))
+    }
+
+    /// Ends the recording; `None` if nothing raced.
+    pub fn finish(mut self) -> Result<Option<Finished>, RecordError> {
+        if self.lanes.is_empty() {
+            return Ok(None);
+        }
+        // The first one owns the file, and closes it when the others are done.
+        let first = self.lanes.remove(0);
+        drop(self.lanes);
+        first.finish().map(Some)
+    }
+}
