@@ -6,7 +6,8 @@
 //! r^p = |q1 - q0| / |q2 - q1|        q* = q2 + (q2 - q1)/(r^p - 1)        (Richardson)
 //! ```
 //! Where the differences shrink at a believable rate, `q*` is the reference and half of what was
-//! added to `q2` its uncertainty (rates above 2 are taken as 2); else `q2` is, and its uncertainty is the larger difference.
+//! added to `q2` its uncertainty (rates above 2 are taken as 2); else `q2` is, and its uncertainty
+//! is the larger difference.
 
 use super::measure::Target;
 use serde::{Deserialize, Serialize};
@@ -79,6 +80,7 @@ impl Reference {
                 kind: Kind::Finest,
                 value: q2.to_vec(),
                 scale,
+                // A rate too good to be true is luck: the small last difference too.
                 uncertainty: fine.max(coarse),
                 rate,
             },

@@ -14,6 +14,9 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use std::sync::Arc;
 use std::time::Instant;
 
+/// Seconds of processor and of the clock, run by run.
+type Times = Vec<[f64; 2]>;
+
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
@@ -104,7 +107,7 @@ fn planned(source: &SceneSource, sets: &[String]) -> Result<Arc<Plan>, CostError
 fn shortened(scene: &Scene, share: f64) -> Result<(Vec<String>, f64), CostError> {
     let end = scene.time.end.eval(&Scope::new(scene)?)?;
     let frames = f64::from(scene.recording.frames);
-    let kept = (frames * share).round().max(1.0);
+    let kept = (frames * share).ceil().max(1.0);
     // A whole number of intervals, so that frames stop the steps as they do in the scene.
     let share = if frames > 1.0 { (kept / frames).min(1.0) } else { share };
     if share >= 1.0 {
@@ -137,7 +140,8 @@ pub fn price(
     let mut cuts = vec![];
     if target.at != Moment::Start && pilot.whole() > limits.base {
         let share = (limits.base - pilot.start) / (pilot.whole() - pilot.start);
-        let least = 6.0 / pilot.steps.max(6.0);
+        // Fewer steps are all start.
+        let least = 10.0 / pilot.steps.max(10.0);
         let (sets, end) = shortened(&scene, share.max(least))?;
         short = source.with_sets(&sets)?;
         horizon = end;
@@ -254,7 +258,7 @@ impl Survey<'_> {
         label: &str,
         sets: &[String],
         least: usize,
-    ) -> Result<Option<(Sample, Vec<[f64; 2]>)>, CostError> {
+    ) -> Result<Option<(Sample, Times)>, CostError> {
         let Some(mut best) = self.sample(label, sets)? else { return Ok(None) };
         let mut took = vec![[best.took.cpu, best.took.wall]];
         let more = REPEATS.iter().find(|(s, _)| best.took.cpu < *s).map_or(1, |r| r.1).max(least);

@@ -434,7 +434,7 @@ fn content(
 /// How the materials of a cell lie.
 enum Form {
     /// Two with an interface.
-    Cut { interface: Interface, between: [usize; 2] },
+    Cut { interface: Box<Interface>, between: [usize; 2] },
     /// Drops in a material of the viscosity `around`.
     Drops { around: f64 },
     /// Unknown.
@@ -562,11 +562,13 @@ impl Scratch {
         if let Some(strip) = minority::sheet(around, stiff) {
             let interface = Interface::of_sheet(&strip, stiff, mesh.cell_size(cell), share);
             if interface.trust > 0.0 {
-                return Form::Cut { interface, between };
+                return Form::Cut { interface: Box::new(interface), between };
             }
         }
         match self.surroundings.interface(share) {
-            Some(interface) if interface.trust > 0.0 => Form::Cut { interface, between },
+            Some(interface) if interface.trust > 0.0 => {
+                Form::Cut { interface: Box::new(interface), between }
+            }
             _ => Form::Mixture,
         }
     }
