@@ -25,7 +25,7 @@ use crate::motion::tracers::DyeLines;
 use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
 use crate::scene::{Integrator, Quadrature as Rule};
-use crate::solve::buoyancy::Restoring;
+use crate::solve::buoyancy::{Ahead, Restoring};
 use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Loads, Report, SolveError, Stokes, Stopping};
@@ -447,10 +447,15 @@ impl<const D: usize> Simulation<D> {
                     Integrator::Extrapolated | Integrator::Midpoint => before,
                 };
                 let (means, slopes) = (self.weight.means(), self.weight.slopes());
-                let load = (self.matter.gravity, ahead);
+                let viscosities = self.matter.materials.iter().map(|m| m.viscosity);
+                let ahead = Ahead {
+                    gravity: self.matter.gravity,
+                    time: ahead,
+                    weakest: viscosities.fold(f64::INFINITY, f64::min),
+                };
                 let mesh = &self.plan.mesh;
                 let density = (means.as_slice(), slopes.as_slice());
-                self.restoring.update(mesh, &self.restoring_faces, density, load, before);
+                self.restoring.update(mesh, &self.restoring_faces, density, ahead, before);
             }
             None => self.restoring.clear(),
         }

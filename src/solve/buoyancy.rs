@@ -45,6 +45,20 @@ pub const SIDE_NODES: [[usize; 3]; 2] = [[2, 5, 8], [6, 7, 8]];
 /// Jumps smaller than this share of the largest density are rounding.
 const LEAST_JUMP: f64 = 1e-13;
 
+/// Terms inside cells come in where the restoring force of a step exceeds the weakest viscosity
+/// this many times: half of where rounding begins to be amplified without them.
+const SUBCELL_STEP: f64 = 100.0;
+
+/// What restoring loads are taken for.
+#[derive(Clone, Copy, Debug)]
+pub struct Ahead {
+    pub gravity: [f64; 2],
+    /// How far ahead of the solution.
+    pub time: f64,
+    /// Smallest viscosity of the scene.
+    pub weakest: f64,
+}
+
 /// The term of one face.
 #[derive(Clone, Copy, Debug)]
 pub struct FaceTerm {
@@ -75,14 +89,14 @@ impl Restoring {
         self.cells.clear();
     }
 
-    /// From the mean density of each cell and its gradient in reference coordinates, for a load
-    /// `ahead` of the time of the solution, and the velocity of the solution before.
+    /// From the mean density of each cell and its gradient in reference coordinates, and the
+    /// velocity of the solution before.
     pub fn update(
         &mut self,
         mesh: &Mesh,
         faces: &[Face],
         (density, slopes): (&[f64], &[[f64; 2]]),
-        (gravity, ahead): ([f64; 2], f64),
+        Ahead { gravity, time: ahead, weakest }: Ahead,
         before: Vec<[f64; 2]>,
     ) {
         self.clear();
@@ -106,7 +120,12 @@ impl Restoring {
             let [hx, hy] = mesh.cell_size(cell);
             let [x, y] = [slope[0] * self.direction[0], slope[1] * self.direction[1]];
             let growth = 2.0 * (x / hx + y / hy);
-            if x + y > least { ahead * g * growth * hx * hy } else { 0.0 }
+            if x + y <= least {
+                return 0.0;
+            }
+            // Faces alone have the whole gradient: at short steps these terms would count it twice.
+            let restoring = ahead * g * growth * hx * hy;
+            restoring * restoring / (restoring + SUBCELL_STEP * weakest)
         }));
     }
 
