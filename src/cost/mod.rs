@@ -7,7 +7,7 @@
 //! error(settings) ~ sum over knobs of C_k h_k^p_k       time(settings) ~ product of ratios
 //! ```
 //! Every candidate is run ([`measure`]), its error is taken against an exact solution or a
-//! self-made reference ([`reference`]), and what no other candidate beats in both error and time
+//! self-made reference ([`mod@reference`]), and what no other candidate beats in both error and time
 //! is the front ([`front`]). [`list`] is what is printed, kept and bought from.
 
 pub mod front;
