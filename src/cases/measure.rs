@@ -2,7 +2,7 @@
 
 use super::{Case, Exact};
 use crate::plan::{Plan, resolve};
-use crate::scene::{SceneError, parse};
+use crate::scene::{SceneError, SceneSource, parse};
 use crate::sim::{self, Run, SimError};
 use crate::space::flow::Flow;
 use crate::space::shape::GAUSS_5;
@@ -26,13 +26,23 @@ pub enum CaseError {
     Sim(#[from] SimError),
 }
 
+/// The plan of a scene, errors pointing into its text.
+pub fn plan_of(source: &SceneSource) -> Result<Plan, CaseError> {
+    Ok(resolve(&parse(source)?).map_err(|e| e.with_source(source))?)
+}
+
+/// A run of a scene at its first instant.
+pub fn start(source: &SceneSource) -> Result<Box<dyn Run>, CaseError> {
+    Ok(sim::start(Arc::new(plan_of(source)?))?)
+}
+
 impl Case {
     /// The plan at a resolution, with further sets.
     pub fn plan(&self, cells: u32, sets: &[&str]) -> Result<Plan, CaseError> {
         let mut all = vec![format!("accuracy.cells={cells}")];
         all.extend(sets.iter().map(|s| s.to_string()));
         let source = self.scene.with_sets(&all)?;
-        Ok(resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?)
+        plan_of(&source)
     }
 
     /// Solves the first instant at a resolution.
@@ -86,14 +96,10 @@ impl<const D: usize> Fields for Solved<'_, D> {
         self.plan
     }
     fn velocity_at(&self, p: [f64; 2]) -> [f64; 3] {
-        let u = &self.plan.units;
-        let v = self.flow.at(&self.plan.mesh, p.map(|c| c / u.length));
-        let w = if D == 3 { v[D - 1] * u.rate() } else { 0.0 };
-        [v[0] * u.velocity(), v[1] * u.velocity(), w]
+        sim::velocity_at(self.plan, &self.flow, p)
     }
     fn pressure_at(&self, p: [f64; 2]) -> f64 {
-        let u = &self.plan.units;
-        self.flow.pressure_at(&self.plan.mesh, p.map(|c| c / u.length)) * u.stress()
+        sim::pressure_at(self.plan, &self.flow, p)
     }
 }
 

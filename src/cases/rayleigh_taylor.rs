@@ -1,11 +1,8 @@
 //! Linear theory of the Rayleigh-Taylor instability of two viscous layers.
 
-use super::CaseError;
-use crate::plan::resolve;
-use crate::scene::{SceneSource, parse};
-use crate::sim;
+use super::{CaseError, start};
+use crate::scene::SceneSource;
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 /// Two layers between plates without slip, free slip (or symmetry) at the sides. SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,8 +104,7 @@ pub fn growth_ratio(u: Undulation, cells: u32, sets: &[&str]) -> Result<f64, Cas
     );
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
     let source = SceneSource::new("growth", text).with_sets(&sets)?;
-    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
-    let run = sim::start(Arc::new(plan))?;
+    let run = start(&source)?;
     let layer = |thickness, viscosity, density| Layer { thickness, viscosity, density };
     let theory = ramberg_growth_rate(&Layers {
         upper: layer(1.0 - THICKNESS, 1.0, 1.0),

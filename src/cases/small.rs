@@ -8,11 +8,8 @@
 //! ```
 //! The second is the dilute limit of a disc in two dimensions.
 
-use super::CaseError;
-use crate::plan::resolve;
-use crate::scene::{SceneSource, parse};
-use crate::sim;
-use std::sync::Arc;
+use super::{CaseError, start};
+use crate::scene::SceneSource;
 
 /// A scene whose excess of dissipation over the pure matrix is known.
 pub struct Small {
@@ -52,8 +49,7 @@ impl Small {
         let mut all = vec![format!("accuracy.cells={cells}")];
         all.extend(sets.iter().map(ToString::to_string));
         let source = self.scene.with_sets(&all)?;
-        let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
-        let run = sim::start(Arc::new(plan))?;
+        let run = start(&source)?;
         Ok((run.row().dissipation - self.matrix) / self.excess)
     }
 }

@@ -154,6 +154,20 @@ pub trait Run: Send {
     fn events(&self) -> &[String];
 }
 
+/// Velocity and rotation (zero if none is solved) of a flow, m/s and 1/s, at an SI point.
+pub fn velocity_at<const D: usize>(plan: &Plan, flow: &Flow<D>, p: [f64; 2]) -> [f64; 3] {
+    let u = &plan.units;
+    let v = flow.at(&plan.mesh, p.map(|c| c / u.length));
+    let w = if D == 3 { v[D - 1] * u.rate() } else { 0.0 };
+    [v[0] * u.velocity(), v[1] * u.velocity(), w]
+}
+
+/// Pressure of a flow, Pa, at an SI point.
+pub fn pressure_at<const D: usize>(plan: &Plan, flow: &Flow<D>, p: [f64; 2]) -> f64 {
+    let u = &plan.units;
+    flow.pressure_at(&plan.mesh, p.map(|c| c / u.length)) * u.stress()
+}
+
 /// Sets a plan up and solves its first instant.
 pub fn start(plan: Arc<Plan>) -> Result<Box<dyn Run>, SimError> {
     if plan.effects.rotation {
@@ -522,14 +536,10 @@ impl<const D: usize> Run for Simulation<D> {
         &self.particles
     }
     fn velocity_at(&self, p: [f64; 2]) -> [f64; 3] {
-        let u = &self.plan.units;
-        let v = self.flow.at(&self.plan.mesh, p.map(|c| c / u.length));
-        let w = if D == 3 { v[D - 1] * u.rate() } else { 0.0 };
-        [v[0] * u.velocity(), v[1] * u.velocity(), w]
+        velocity_at(&self.plan, &self.flow, p)
     }
     fn pressure_at(&self, p: [f64; 2]) -> f64 {
-        let u = &self.plan.units;
-        self.flow.pressure_at(&self.plan.mesh, p.map(|c| c / u.length)) * u.stress()
+        pressure_at(&self.plan, &self.flow, p)
     }
     fn picture(&self) -> crate::frame::Picture {
         self.draw()

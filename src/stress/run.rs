@@ -1,9 +1,7 @@
 //! Runs trials, and keeps what failed.
 
 use super::{CRITERIA, Outcome, Trial, Verdict, judge};
-use crate::cases::CaseError;
-use crate::plan::resolve;
-use crate::scene::parse;
+use crate::cases::{CaseError, plan_of};
 use crate::sim::{self, Run};
 use crate::space::mesh::Axis;
 use crate::verify::{Bound, Check};
@@ -154,7 +152,7 @@ impl Trial {
     }
 
     fn attempt(&self, steps: &mut u64) -> Result<Vec<Check>, CaseError> {
-        let plan = resolve(&parse(&self.scene)?).map_err(|e| e.with_source(&self.scene))?;
+        let plan = plan_of(&self.scene)?;
         let mut run = sim::start(Arc::new(plan))?;
         let first = First::new(run.as_ref());
         let mut worst = Worst::default();
@@ -236,7 +234,7 @@ mod tests {
         let here = TempFolder::new().expect("a folder");
         let place = keep(here.path(), &bad, &outcome).expect("written");
         let kept = scene::load(place.join("scene.toml")).expect("there");
-        resolve(&parse(&kept).expect("a scene")).expect("that can be run");
+        plan_of(&kept).expect("a scene that can be run");
         let reason = std::fs::read_to_string(place.join("reason.txt")).expect("there");
         assert!(reason.contains("fail: speed") && reason.contains("--steps 1"), "{reason}");
     }

@@ -2,11 +2,8 @@
 
 use super::Effort;
 use super::report::{Bound, Section, Table, number};
-use crate::cases::CaseError;
-use crate::plan::resolve;
-use crate::scene::{parse, presets};
-use crate::sim;
-use std::sync::Arc;
+use crate::cases::{CaseError, start};
+use crate::scene::presets;
 
 /// Cells of the uniform mesh at the preset's resolution: 8 per aperture, 6 x 8 apertures.
 const UNIFORM_CELLS: f64 = 48.0 * 64.0;
@@ -15,9 +12,9 @@ const UNIFORM_CELLS: f64 = 48.0 * 64.0;
 fn discharge(sets: &[&str]) -> Result<(f64, [usize; 2]), CaseError> {
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
     let source = presets::find("silo")?.with_sets(&sets)?;
-    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
-    let cells = [plan.mesh.x.cells(), plan.mesh.y.cells()];
-    let run = sim::start(Arc::new(plan))?;
+    let run = start(&source)?;
+    let mesh = &run.plan().mesh;
+    let cells = [mesh.x.cells(), mesh.y.cells()];
     Ok((run.row().gauges[0].rate / 1e4, cells))
 }
 

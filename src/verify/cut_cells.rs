@@ -4,12 +4,10 @@ use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
 use crate::cases::{
     Case, CaseError, Drive, Inclined, Small, SolCx, inclined_pure_shear, inclined_shear, solcx,
-    solvi,
+    solvi, start,
 };
-use crate::plan::resolve;
-use crate::scene::{SceneSource, parse};
-use crate::sim::{self, SimError};
-use std::sync::Arc;
+use crate::scene::SceneSource;
+use crate::sim::SimError;
 
 /// The rule the table compares everything with.
 const DEFAULT: &str = "laminate";
@@ -184,8 +182,7 @@ fn fall(drop: &str, around: &str, cells: u32, rule: &str) -> Result<f64, CaseErr
          shape.circle = {{ centre = [0.37, 0.55], radius = 0.23 }}\n"
     );
     let source = SceneSource::new("drop", text);
-    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
-    Ok(sim::start(Arc::new(plan))?.row().max_speed)
+    Ok(start(&source)?.row().max_speed)
 }
 
 fn drops(effort: Effort, out: &mut Section) -> Result<(), CaseError> {

@@ -2,12 +2,9 @@
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
-use crate::cases::CaseError;
 use crate::cases::rayleigh_taylor::{Undulation, growth_ratio};
-use crate::plan::resolve;
-use crate::scene::{parse, presets};
-use crate::sim;
-use std::sync::Arc;
+use crate::cases::{CaseError, start};
+use crate::scene::presets;
 
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
@@ -55,8 +52,7 @@ fn growth(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
 fn benchmark(out: &mut Section) -> Result<(), CaseError> {
     let sets = ["accuracy.cells=64".into(), "time.end=300".into(), "recording.frames=1".into()];
     let source = presets::find("rayleigh_taylor")?.with_sets(&sets)?;
-    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
-    let mut run = sim::start(Arc::new(plan))?;
+    let mut run = start(&source)?;
     let mut curve = vec![(run.row().time, run.row().rms_speed)];
     while !run.is_finished() {
         run.step()?;

@@ -2,18 +2,10 @@
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
-use crate::cases::CaseError;
-use crate::plan::resolve;
-use crate::scene::{SceneSource, parse, presets};
-use crate::sim::{self, Run};
-use std::sync::Arc;
+use crate::cases::{CaseError, start};
+use crate::scene::{SceneSource, presets};
 
 const PLACEMENTS: [&str; 3] = ["regular", "jittered", "random"];
-
-fn start(source: &SceneSource) -> Result<Box<dyn Run>, CaseError> {
-    let plan = resolve(&parse(source)?).map_err(|e| e.with_source(source))?;
-    Ok(sim::start(Arc::new(plan))?)
-}
 
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {

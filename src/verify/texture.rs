@@ -2,11 +2,8 @@
 
 use super::Effort;
 use super::report::{Bound, Section, Table};
-use crate::cases::CaseError;
-use crate::plan::resolve;
-use crate::scene::{parse, presets};
-use crate::sim;
-use std::sync::Arc;
+use crate::cases::{CaseError, start};
+use crate::scene::presets;
 
 const ETA: f64 = 1000.0;
 const ETA_S: f64 = 500.0;
@@ -58,8 +55,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         format!("recording.times={:?}", times),
     ];
     let source = presets::find("shear_alignment")?.with_sets(&sets)?;
-    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
-    let mut run = sim::start(Arc::new(plan))?;
+    let mut run = start(&source)?;
     let mut table = Table::new(
         "",
         &["shear", "time, s", "mean abs n_x", "closed form", "viscosity, Pa s", "closed form"],

@@ -2,11 +2,8 @@
 
 use super::Effort;
 use super::report::{Bound, Section, Table, number};
-use crate::cases::CaseError;
-use crate::plan::resolve;
-use crate::scene::{SceneSource, parse};
-use crate::sim;
-use std::sync::Arc;
+use crate::cases::{CaseError, start};
+use crate::scene::SceneSource;
 
 /// A box whose lid moves: the corners of a lid are where particles crowd and thin out most.
 const LID: &str = "schema = 1\nname = \"lid\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\n\
@@ -28,8 +25,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         ..Section::default()
     };
     let source = SceneSource::new("lid", LID);
-    let plan = resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?;
-    let mut run = sim::start(Arc::new(plan))?;
+    let mut run = start(&source)?;
     let start: f64 = run.particles().volume.iter().sum();
     let mut table = Table::new(
         "",
