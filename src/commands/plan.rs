@@ -1,7 +1,12 @@
-//! `grainscope plan`: which effects are solved, and why.
+//! `grainscope plan`: which effects are solved, why, and what each takes of a step.
 
 use super::{Failure, print};
+use crate::cost::effects;
 use crate::record::text::plan_text;
+use std::sync::Arc;
+
+/// Steps that are measured of each run.
+const STEPS: u32 = 4;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -10,6 +15,9 @@ pub struct Args {
     /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
+    /// Do not take some steps to measure what each effect takes
+    #[arg(long)]
+    no_measure: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -18,7 +26,12 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
     let (_, plan) = super::resolve(&source)?;
-    let list = plan.describe();
+    let plan = Arc::new(plan);
+    let mut list = plan.describe();
+    if !args.no_measure {
+        eprintln!("taking some steps to measure what each effect takes (--no-measure skips it)");
+        effects::measure(&plan, &mut list, STEPS)?;
+    }
     if args.json {
         let text =
             serde_json::to_string_pretty(&list).map_err(|e| Failure::Environment(e.to_string()))?;

@@ -8,8 +8,9 @@
 //! ```
 //! Every candidate is run ([`measure`]), its error is taken against an exact solution or a
 //! self-made reference ([`mod@reference`]), and what no other candidate beats in both error and time
-//! is the front ([`front`]). [`list`] is what is printed, kept and bought from.
+//! is the front ([`front`]). [`effects`] prices what a scene calls for. [`list`] is what is printed, kept and bought from.
 
+pub mod effects;
 pub mod front;
 pub mod knobs;
 pub mod list;

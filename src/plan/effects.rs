@@ -4,9 +4,50 @@ use super::Plan;
 use crate::scene::Quadrature;
 use serde::Serialize;
 
+/// What a scene may call for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EffectKind {
+    Flow,
+    Rotation,
+    Directors,
+    Gravity,
+    Stabilisation,
+    BodyForce,
+    Acceleration,
+    CarriedViscosity,
+    CarriedDensity,
+    VolumeChange,
+    Dye,
+    Gauges,
+    CutCells,
+}
+
+impl EffectKind {
+    pub fn name(self) -> &'static str {
+        use EffectKind::*;
+        match self {
+            Flow => "velocity and pressure",
+            Rotation => "Cosserat rotation",
+            Directors => "directors",
+            Gravity => "gravity",
+            Stabilisation => "stabilised stratification",
+            BodyForce => "fixed body force",
+            Acceleration => "acceleration",
+            CarriedViscosity => "carried viscosity",
+            CarriedDensity => "carried density",
+            VolumeChange => "volume change",
+            Dye => "dye lines",
+            Gauges => "gauges",
+            CutCells => "cut cells",
+        }
+    }
+}
+
 /// One effect: solved or left out, and why.
 #[derive(Clone, Debug, Serialize)]
 pub struct Effect {
+    #[serde(skip)]
+    pub kind: EffectKind,
     pub name: &'static str,
     pub solved: bool,
     pub why: String,
@@ -16,6 +57,20 @@ pub struct Effect {
     pub particle_bytes: usize,
     /// Stages of a step it adds.
     pub stages: Vec<&'static str>,
+    /// Share of a step's time, if it was measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share: Option<f64>,
+}
+
+/// What a step takes, measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct StepTime {
+    /// Steps that were measured.
+    pub steps: u32,
+    /// Seconds of a processor for a step, their median.
+    pub seconds: f64,
+    /// Seconds of a step by phase, their mean.
+    pub phases: Vec<(&'static str, f64)>,
 }
 
 /// All effects with the sizes of the problem.
@@ -31,7 +86,16 @@ pub struct EffectList {
     pub particle_columns: Vec<&'static str>,
     pub stages: Vec<&'static str>,
     pub effects: Vec<Effect>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<StepTime>,
     pub warnings: Vec<String>,
+}
+
+impl EffectList {
+    /// Whether an effect is solved.
+    pub fn has(&self, kind: EffectKind) -> bool {
+        self.effects.iter().any(|e| e.kind == kind && e.solved)
+    }
 }
 
 impl Plan {
@@ -71,6 +135,7 @@ impl Plan {
             particle_columns: columns,
             stages,
             effects,
+            step: None,
             warnings: self.warnings.iter().map(ToString::to_string).collect(),
         }
     }
@@ -84,21 +149,25 @@ impl Plan {
         let e = &self.effects;
         let nodes = self.mesh.nodes();
         let mut list = Vec::new();
-        let mut add = |name, solved, why: String, unknowns, particle_bytes, stages: &[_]| {
-            let (unknowns, particle_bytes) =
-                if solved { (unknowns, particle_bytes) } else { (0, 0) };
-            list.push(Effect {
-                name,
-                solved,
-                why,
-                unknowns,
-                particle_bytes,
-                stages: stages.to_vec(),
-            });
-        };
+        use EffectKind::*;
+        let mut add =
+            |kind: EffectKind, solved, why: String, unknowns, particle_bytes, stages: &[_]| {
+                let (unknowns, particle_bytes) =
+                    if solved { (unknowns, particle_bytes) } else { (0, 0) };
+                list.push(Effect {
+                    kind,
+                    name: kind.name(),
+                    share: None,
+                    solved,
+                    why,
+                    unknowns,
+                    particle_bytes,
+                    stages: stages.to_vec(),
+                });
+            };
         let why = |on: bool, yes: String, no: &str| if on { yes } else { no.to_string() };
         add(
-            "velocity and pressure",
+            Flow,
             true,
             "every scene: Q2 velocity, discontinuous linear pressure".into(),
             2 * nodes + 3 * self.mesh.cells(),
@@ -106,7 +175,7 @@ impl Plan {
             &[],
         );
         add(
-            "Cosserat rotation",
+            Rotation,
             e.rotation,
             why(
                 e.rotation,
@@ -121,7 +190,7 @@ impl Plan {
             &[],
         );
         add(
-            "directors",
+            Directors,
             e.directors,
             why(
                 e.directors,
@@ -133,7 +202,7 @@ impl Plan {
             &["director turning"],
         );
         add(
-            "gravity",
+            Gravity,
             e.gravity,
             why(
                 e.gravity,
@@ -146,7 +215,7 @@ impl Plan {
         );
         let stabilised = self.method.stabilisation;
         add(
-            "stabilised stratification",
+            Stabilisation,
             stabilised.is_some(),
             why(
                 stabilised.is_some(),
@@ -161,7 +230,7 @@ impl Plan {
             &["restoring loads"],
         );
         add(
-            "fixed body force",
+            BodyForce,
             self.body_force.is_some(),
             why(self.body_force.is_some(), "[body_force]".into(), "no [body_force]"),
             0,
@@ -169,7 +238,7 @@ impl Plan {
             &[],
         );
         add(
-            "acceleration",
+            Acceleration,
             self.acceleration.is_some(),
             why(
                 self.acceleration.is_some(),
@@ -181,7 +250,7 @@ impl Plan {
             &["body force"],
         );
         add(
-            "carried viscosity",
+            CarriedViscosity,
             e.carried_viscosity,
             why(
                 e.carried_viscosity,
@@ -193,7 +262,7 @@ impl Plan {
             &[],
         );
         add(
-            "carried density",
+            CarriedDensity,
             e.carried_density,
             why(e.carried_density, names(&|m| m.carries_density), "every density is constant"),
             0,
@@ -201,7 +270,7 @@ impl Plan {
             &[],
         );
         add(
-            "volume change",
+            VolumeChange,
             e.volume_change,
             why(
                 e.volume_change,
@@ -213,10 +282,10 @@ impl Plan {
             &["volume change"],
         );
         let dye = self.tracers.is_some();
-        add("dye lines", dye, why(dye, "[dye]".into(), "no [dye] lines"), 0, 0, &["dye"]);
+        add(Dye, dye, why(dye, "[dye]".into(), "no [dye] lines"), 0, 0, &["dye"]);
         let gauges = !self.gauges.is_empty();
         add(
-            "gauges",
+            Gauges,
             gauges,
             why(
                 gauges,
@@ -233,7 +302,7 @@ impl Plan {
             Quadrature::Particles => "\"particles\": each particle by itself, as in the source",
         };
         add(
-            "cut cells",
+            CutCells,
             self.state.materials.len() > 1,
             why(
                 self.state.materials.len() > 1,

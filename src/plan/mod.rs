@@ -14,7 +14,7 @@ pub mod units;
 mod warning;
 
 pub use boundary::{BoundaryPlan, Side, WallLine};
-pub use effects::{Effect, EffectList};
+pub use effects::{Effect, EffectKind, EffectList, StepTime};
 pub use resolve::{MAX_MATERIALS, resolve};
 pub use units::Units;
 pub use warning::Warning;

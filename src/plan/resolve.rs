@@ -56,7 +56,7 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
         };
         let other = resolve_without_schedule(&current)?;
         let units = plan.units;
-        let state = Si::new(&current, &scope)?.matter(&units);
+        let state = Si::new(&placed(&current), &scope)?.matter(&units);
         if geometry(&other) != geometry(&plan)
             || other.effects != plan.effects
             || other.initial != plan.initial
@@ -571,10 +571,19 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
         Some(q) => positive(q, scope, "length_scale")?,
         None => (x[1] - x[0]).min(y[1] - y[0]),
     };
+    // Every material and region is checked, also those that are nowhere to be seen.
+    let mut warnings = Vec::new();
+    regions(scene, scope, domain, &Si::new(scene, scope)?, &mut warnings)?;
+    let (whole, scene) = (scene, &placed(scene));
+    for name in whole.materials.keys().filter(|name| !scene.materials.contains_key(*name)) {
+        if !whole.materials[name].background {
+            warnings.push(Warning::MaterialUnused { material: name.clone() });
+        }
+    }
     let si = Si::new(scene, scope)?;
     let units = choose_units(scene, scope, &si, domain, length)?;
     let state = si.matter(&units);
-    let mut warnings = si.warnings.clone();
+    warnings.extend(si.warnings.iter().cloned());
 
     let walls = Walls::new(scene, scope, domain)?;
     let gauges = gauges(scene, scope, domain)?;
@@ -593,7 +602,7 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
         }
     }
 
-    let regions = regions(scene, scope, domain, &si, &mut warnings)?;
+    let regions = regions(scene, scope, domain, &si, &mut Vec::new())?;
     let has_density = si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some());
     let effects = EffectSet {
         rotation: si.materials.iter().any(|m| m.rotation.is_some()),
@@ -653,7 +662,7 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
     let gauges = gauges.into_iter().map(|g| g.scaled(&mesh, &units)).collect();
     let (tracers, marks) = dye(scene, scope, length, &units)?;
     Ok(Plan {
-        scene: scene.clone(),
+        scene: whole.clone(),
         units,
         enclosure,
         boundary,
@@ -1420,12 +1429,22 @@ fn regions(
         };
         out.push(Region { material, shape, director });
     }
-    for (index, m) in si.materials.iter().enumerate() {
-        if !m.background && !out.iter().any(|r| r.material as usize == index) {
-            warnings.push(Warning::MaterialUnused { material: m.name.clone() });
-        }
-    }
     Ok(out)
+}
+
+/// The scene without regions that a later one covers everywhere, and without materials that then
+/// fill nothing and that no gauge counts: what is not there must not be solved for.
+fn placed(scene: &Scene) -> Scene {
+    let mut s = scene.clone();
+    let everywhere = s.regions.iter().rposition(|r| matches!(r.shape, Shape::Everywhere));
+    s.regions.drain(..everywhere.unwrap_or(0));
+    let (regions, gauges) = (&s.regions, &s.gauges);
+    s.materials.retain(|name, m| {
+        m.background && everywhere.is_none()
+            || regions.iter().any(|r| r.material == *name)
+            || gauges.iter().any(|g| g.material == *name)
+    });
+    s
 }
 
 fn dye(

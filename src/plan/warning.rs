@@ -15,7 +15,7 @@ pub enum Warning {
     RotationUnused { place: String },
     /// Directors given for a material that has no layers.
     DirectorUnused { material: String },
-    /// A material that no region, and no background, uses.
+    /// A material that fills nothing.
     MaterialUnused { material: String },
     /// More particles than are written per frame.
     ParticlesThinned { every: usize },
@@ -56,7 +56,11 @@ impl fmt::Display for Warning {
                  give it a layer_viscosity other than its shear_viscosity"
             ),
             Warning::MaterialUnused { material } => {
-                write!(f, "material `{material}` fills no region; add one, or remove the material")
+                write!(
+                    f,
+                    "material `{material}` fills nothing and is left out; give it a region that \
+                     no later one covers, or remove it"
+                )
             }
             Warning::ParticlesThinned { every } => write!(
                 f,

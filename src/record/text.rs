@@ -22,9 +22,14 @@ pub fn plan_markdown(plan: &EffectList) -> String {
 /// A plan for the terminal.
 pub fn plan_text(plan: &EffectList) -> String {
     let mut out = format!("{}: {}\n\n", plan.scene, sizes(plan));
-    let mut row = |mark: &str, name: &str, cost: &str, why: &str| {
-        out += &format!("  {mark:<3} {name:<30} {cost:<26} {why}\n");
+    let measured = plan.step.is_some();
+    let mut row = |mark: &str, name: &str, share: &str, cost: &str, why: &str| {
+        let share = if measured { format!("{share:>8}  ") } else { String::new() };
+        out += &format!("  {mark} {name:<26}{share}{cost:<41} {why}\n");
     };
+    if measured {
+        row(" ", "", "share", "adds", "why");
+    }
     for e in plan.effects.iter().filter(|e| e.solved) {
         let mut cost = Vec::new();
         if e.unknowns > 0 {
@@ -36,10 +41,24 @@ pub fn plan_text(plan: &EffectList) -> String {
         if !e.stages.is_empty() {
             cost.push(format!("stage: {}", e.stages.join(", ")));
         }
-        row("+", e.name, &cost.join(", "), &e.why);
+        row("+", e.name, &share(e.share), &cost.join(", "), &e.why);
     }
     for e in plan.effects.iter().filter(|e| !e.solved) {
-        row("-", e.name, "left out", &e.why);
+        row("-", e.name, "", "left out", &e.why);
+    }
+    if let Some(step) = &plan.step {
+        let total: f64 = step.phases.iter().map(|p| p.1).sum();
+        let phases = step.phases.iter().filter(|p| p.1 >= 0.001 * total);
+        let words: Vec<_> =
+            phases.map(|(name, s)| format!("{name} {:.1} %", 100.0 * s / total)).collect();
+        out += &format!(
+            "\na step: {} of a processor (median of {}): {}\n\
+             share: 1 - (a step of the scene without the effect)/(a step with it); of gravity, dye \
+             and cut\ncells, that of their own stages\n",
+            duration(step.seconds),
+            step.steps,
+            words.join(", ")
+        );
     }
     out += &format!("\nparticle columns: {}\n", plan.particle_columns.join(", "));
     out += &format!("stages of a step: {}\n", plan.stages.join(", "));
@@ -47,6 +66,15 @@ pub fn plan_text(plan: &EffectList) -> String {
         out += &format!("\nwarning: {w}\n");
     }
     out
+}
+
+/// A measured share of a step.
+fn share(share: Option<f64>) -> String {
+    match share {
+        None => "-".into(),
+        Some(s) if s < 0.001 => "< 0.1 %".into(),
+        Some(s) => format!("{:.1} %", 100.0 * s),
+    }
 }
 
 fn sizes(plan: &EffectList) -> String {

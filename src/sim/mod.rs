@@ -279,12 +279,14 @@ impl<const D: usize> Simulation<D> {
                 &mut self.gauges,
                 &mut self.count,
             );
-            if let Some(dye) = &mut self.dye {
-                dye.advance(&carrier);
-            }
             self.particles.sort(&plan.mesh);
+            if let Some(dye) = &mut self.dye {
+                let phase = Instant::now();
+                dye.advance(&carrier);
+                seconds.dye += phase.elapsed().as_secs_f64();
+            }
         }
-        seconds.motion += phase.elapsed().as_secs_f64();
+        seconds.motion += phase.elapsed().as_secs_f64() - seconds.dye;
         let phase = Instant::now();
         self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
         seconds.population += phase.elapsed().as_secs_f64();
@@ -434,9 +436,11 @@ impl<const D: usize> Simulation<D> {
             source.y *= plan.units.length;
             SimError::Empty { step, time, source }
         })?;
+        seconds.quadrature += phase.elapsed().as_secs_f64();
+        let phase = Instant::now();
         self.update_load();
         self.update_restoring(restoring);
-        seconds.quadrature += phase.elapsed().as_secs_f64();
+        seconds.weight += phase.elapsed().as_secs_f64();
         let stopping = Stopping {
             tolerance: plan.method.tolerance,
             max_corrections: plan.method.max_corrections,

@@ -70,10 +70,13 @@ pub struct GaugeRow {
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Phases {
     pub quadrature: f64,
+    /// Gravity, accelerations and the restoring loads of stratification.
+    pub weight: f64,
     pub assemble: f64,
     pub factor: f64,
     pub solve: f64,
     pub motion: f64,
+    pub dye: f64,
     pub population: f64,
     pub diagnostics: f64,
 }
@@ -81,21 +84,25 @@ pub struct Phases {
 impl Phases {
     pub fn add(&mut self, o: &Phases) {
         self.quadrature += o.quadrature;
+        self.weight += o.weight;
         self.assemble += o.assemble;
         self.factor += o.factor;
         self.solve += o.solve;
         self.motion += o.motion;
+        self.dye += o.dye;
         self.population += o.population;
         self.diagnostics += o.diagnostics;
     }
 
-    pub fn list(&self) -> [(&'static str, f64); 7] {
+    pub fn list(&self) -> [(&'static str, f64); 9] {
         [
             ("quadrature", self.quadrature),
+            ("weight", self.weight),
             ("assemble", self.assemble),
             ("factor", self.factor),
             ("solve", self.solve),
             ("motion", self.motion),
+            ("dye", self.dye),
             ("population", self.population),
             ("diagnostics", self.diagnostics),
         ]

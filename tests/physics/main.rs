@@ -2,6 +2,7 @@
 
 mod alignment;
 mod dynamics;
+mod effects;
 mod exact;
 mod laws;
 mod order;

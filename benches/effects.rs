@@ -1,0 +1,154 @@
+//! What each effect adds to a step, as the ratio of a scene with it to the same scene without it,
+//! stepped in turn: `cargo bench --bench effects`. An effect that is named but switched off must
+//! cost nothing: its ratio to a scene that never named it is 1 but for noise, which the same scene
+//! against itself shows.
+
+use grainscope::cost::effects::{Pair, pair, without};
+use grainscope::cost::measure::timed;
+use grainscope::plan::{EffectKind, Plan};
+use grainscope::record::info;
+use grainscope::record::logger::{Backpressure, Logger};
+use grainscope::record::rerun_log::{RerunLog, Sink};
+use grainscope::{plan, scene, sim};
+use std::error::Error;
+use std::sync::Arc;
+
+/// Steps of each scene; medians are compared.
+const STEPS: u32 = 15;
+
+/// A fluid under a moving lid; what is below `level` may be another one.
+const LID: &str = r#"
+schema = 1
+name = "lid"
+[domain]
+x = [0, 1]
+y = [0, 1]
+[accuracy]
+cells = 48
+[time]
+end = 10
+[materials.fluid]
+shear_viscosity = 1
+density = 1
+[[regions]]
+material = "fluid"
+[boundaries]
+left.kind = "no_slip"
+right.kind = "no_slip"
+bottom.kind = "no_slip"
+top = { kind = "no_slip", velocity_x = "16*x*x*(1-x)*(1-x)" }
+"#;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+fn source(text: &str, sets: &[&str]) -> Outcome<scene::SceneSource> {
+    let sets: Vec<String> = sets.iter().map(|s| s.to_string()).collect();
+    let source = if text.contains('\n') {
+        scene::SceneSource::new("lid.toml", text)
+    } else {
+        scene::presets::find(text)?
+    };
+    Ok(source.with_sets(&sets)?)
+}
+
+fn plan_of(source: &scene::SceneSource) -> Outcome<Arc<Plan>> {
+    let plan = plan::resolve(&scene::parse(source)?).map_err(|e| e.with_source(source))?;
+    Ok(Arc::new(plan))
+}
+
+fn print(what: &str, p: Pair) {
+    println!(
+        "  {what:<44} {:>8.2} ms {:>8.2} ms {:>7.3}",
+        1e3 * p.with,
+        1e3 * p.without,
+        p.with / p.without
+    );
+}
+
+/// A preset with an effect against the same scene without it.
+fn removed(text: &str, sets: &[&str], effect: EffectKind, what: &str) -> Outcome<()> {
+    let with = source(text, sets)?;
+    let other = without(&scene::parse(&with)?, effect).ok_or("cannot be taken out")?;
+    print(what, pair(&plan_of(&with)?, &Arc::new(plan::resolve(&other)?), STEPS)?);
+    Ok(())
+}
+
+/// Two scenes.
+fn against(with: (&str, &[&str]), other: (&str, &[&str]), what: &str) -> Outcome<()> {
+    let plan = |(text, sets)| source(text, sets).and_then(|s| plan_of(&s));
+    print(what, pair(&plan(with)?, &plan(other)?, STEPS)?);
+    Ok(())
+}
+
+/// Seconds that a frame with a picture takes from the simulation's thread, beside a step's.
+fn recording() -> Outcome<()> {
+    let plan = plan_of(&source("silo", &[])?)?;
+    let file = std::env::temp_dir().join(format!("grainscope-bench-{}.rrd", std::process::id()));
+    let log = RerunLog::open(&info::run_info(&plan, "bench"), &[Sink::Save(file.clone())])?;
+    let mut logger = Logger::start(log, Backpressure::Wait)?;
+    let mut run = sim::start(plan.clone())?;
+    run.step()?;
+    let (mut step, mut frame) = (0.0, 0.0);
+    for _ in 0..STEPS {
+        let (outcome, took) = timed(|| run.step());
+        outcome?;
+        step += took.cpu;
+        let (sent, took) = timed(|| {
+            let frame = info::frame(&plan, run.row(), 0.0, Some(run.picture()), vec![]);
+            logger.send(frame)
+        });
+        sent.map_err(|_| "the logger ended")?;
+        frame += took.cpu;
+    }
+    let (finished, _, busy) = logger.finish();
+    finished?;
+    std::fs::remove_file(&file)?;
+    let n = f64::from(STEPS);
+    print(
+        "recording a picture every step (silo)",
+        Pair { with: (step + frame) / n, without: step / n },
+    );
+    println!(
+        "  {:<44} {:>8.2} ms a picture, on its own thread",
+        "the logger beside it",
+        1e3 * busy.as_secs_f64() / n
+    );
+    Ok(())
+}
+
+fn main() -> Outcome<()> {
+    let silo_plain = include_str!("../presets/silo.toml")
+        .replace("coupling_viscosity = \"coupling * 1000\"\n", "")
+        .replace("internal_length = \"alpha * aperture\"\n", "");
+    let shear_plain = include_str!("../presets/shear_alignment.toml")
+        .replace("layer_viscosity = \"eta_s\"\n", "")
+        .replace("director = \"random\"\n", "")
+        .replace("quantity = \"alignment\"\nfloor = 1e-3", "quantity = \"rms_speed\"\nfloor = 0");
+    let two = LID.replace("[[regions]]\nmaterial = \"fluid\"\n", "")
+        + "[materials.rest]\nshear_viscosity = 1\ndensity = 1\nbackground = true\n\
+           [[regions]]\nmaterial = \"fluid\"\nshape.rectangle = { x = [0, 1], y = [0, 0.51] }\n";
+    let named = LID.to_string() + "[materials.rest]\nshear_viscosity = 1\nbackground = true\n";
+
+    println!("step with, step without (processor time, medians of {STEPS}), ratio");
+    removed("silo", &[], EffectKind::Rotation, "Cosserat rotation (silo)")?;
+    removed("shear_alignment", &[], EffectKind::Directors, "directors (shear_alignment)")?;
+    against((&two, &[]), (LID, &[]), "a background that fills half (lid)")?;
+    removed("silo", &[], EffectKind::Dye, "dye lines (silo)")?;
+    removed("silo", &[], EffectKind::Gauges, "gauges (silo)")?;
+    removed("silo", &[], EffectKind::Stabilisation, "stabilised stratification (silo)")?;
+    against((LID, &["gravity[1]=-10"]), (LID, &[]), "gravity (lid)")?;
+    recording()?;
+
+    println!("\nswitched off, never named (the same): the ratio is 1 but for noise");
+    against(("silo", &[]), ("silo", &[]), "the same scene twice (silo)")?;
+    against(("silo", &["alpha=0"]), (&silo_plain, &[]), "Cosserat rotation (silo)")?;
+    against(
+        ("shear_alignment", &["eta_s=1000", "interest.quantity=rms_speed"]),
+        (&shear_plain, &[]),
+        "directors (shear_alignment)",
+    )?;
+    against((&named, &[]), (LID, &[]), "a background without room (lid)")?;
+    against((LID, &["gravity[1]=0"]), (LID, &[]), "gravity (lid)")?;
+    against((LID, &["dye.lines=[]"]), (LID, &[]), "dye lines (lid)")?;
+    Ok(())
+}
