@@ -62,9 +62,6 @@ const REST: f64 = 1e-6;
 /// the rounding of a rigid one.
 const RIGID_POWER: f64 = 3e-2;
 
-/// Powers below this share of [`Report::gross_power`] too.
-const CANCELLED: f64 = 1e-5;
-
 /// Most corrections that a new one is combined with.
 const MOST_DIRECTIONS: usize = 6;
 
@@ -90,11 +87,10 @@ pub struct Report {
     pub dissipation: f64,
     /// Power that the restoring terms of [`super::buoyancy`] take from the flow; numerical.
     pub restoring: f64,
-    /// `||f||^2_{1/D}`, the power the loads would have on a mesh of one element, and a little of
-    /// `||sqrt(D) u||^2`: a scale for powers that rounding alone makes.
+    /// A scale for powers that rounding alone makes: `||f||^2_{1/D}`, the power the loads would
+    /// have on a mesh of one element, `integral p^2/eta`, what the pressure would have if it strained
+    /// the stiffest fluid, and a little of `||sqrt(D) u||^2`.
     pub power_scale: f64,
-    /// Sum over the unknowns of `|f u|`: what the power of the loads is the difference of.
-    pub gross_power: f64,
     /// Rotation unknowns that some Cosserat material acts on.
     pub active_rotation: usize,
     pub seconds: Seconds,
@@ -103,8 +99,7 @@ pub struct Report {
 impl Report {
     /// What is left of the powers, over the largest of them.
     pub fn power_error(&self) -> f64 {
-        let rest = (REST * self.power_scale).max(CANCELLED * self.gross_power);
-        let larger = [self.power_in, self.dissipation, self.restoring, rest];
+        let larger = [self.power_in, self.dissipation, self.restoring, REST * self.power_scale];
         let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));
         let difference = (self.power_in - self.dissipation - self.restoring).abs();
         if larger > 0.0 { difference / larger } else { 0.0 }
@@ -244,6 +239,10 @@ struct Residual<const D: usize> {
     pressure_norm: f64,
     /// `||W^-1 p||^2`, the divergence that would make such a pressure.
     yielding: f64,
+    /// `integral p^2`
+    pressure_square: f64,
+    /// Largest mean viscosity of a cell.
+    stiffest: f64,
 }
 
 impl<const D: usize> Stokes<D> {
@@ -344,19 +343,16 @@ impl<const D: usize> Stokes<D> {
         loop {
             self.residual(quadrature, loads, flow, &mut work.residual);
             let residual = &work.residual;
-            (report.residual, report.divergence, report.power_scale) =
+            let slack;
+            (report.residual, report.divergence, slack, report.power_scale) =
                 self.norms(residual, load, flow);
             report.dissipation = residual.dissipation;
             report.restoring = residual.restoring;
             report.power_in = self.power_in(residual, load, flow);
-            let both = load.iter().flatten().zip(flow.velocity.iter().flatten());
-            report.gross_power = both.map(|(f, u)| (f * u).abs()).sum();
             if !(report.residual.is_finite() && report.divergence.is_finite()) {
                 return Err(SolveError::NonFinite { corrections: report.corrections });
             }
             let balanced = report.residual <= stopping.tolerance;
-            let strain = residual.strain.sqrt();
-            let slack = if strain > 0.0 { residual.yielding.sqrt() / strain } else { 0.0 };
             let converged = balanced
                 && report.divergence <= stopping.tolerance * (1.0 + PRESSURE_SHARE * slack);
             if converged {
@@ -545,6 +541,7 @@ impl<const D: usize> Stokes<D> {
         out.divergence.resize(self.mesh.cells(), [0.0; 3]);
         (out.dissipation, out.strain, out.divergence_norm) = (0.0, 0.0, 0.0);
         (out.restoring, out.pressure_norm, out.yielding) = (0.0, 0.0, 0.0);
+        (out.pressure_square, out.stiffest) = (0.0, 0.0);
         for face in &restoring.faces {
             let nodes = SIDE_NODES[face.normal].map(|a| self.nodes[face.cell][a]);
             let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
@@ -566,6 +563,7 @@ impl<const D: usize> Stokes<D> {
             let mass = pressure_mass(area);
             let pressure = flow.pressure[cell];
             let compliance = quadrature.compliance[cell];
+            out.stiffest = out.stiffest.max(quadrature.mean_viscosity[cell]);
             let mut g = [[0.0; D]; NODES];
             divergence.add_transposed(&pressure, &mut g);
             for (a, node) in self.nodes[cell].into_iter().enumerate() {
@@ -578,6 +576,7 @@ impl<const D: usize> Stokes<D> {
                 let rp = bu[q] + compliance * mass[q] * pressure[q];
                 let needed = pressure[q] / self.cells[cell].penalty[q];
                 out.yielding += needed * needed / mass[q];
+                out.pressure_square += mass[q] * pressure[q] * pressure[q];
                 out.divergence[cell][q] = rp;
                 out.divergence_norm += rp * rp / mass[q];
                 out.dissipation += compliance * mass[q] * pressure[q] * pressure[q];
@@ -599,8 +598,9 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    /// Scaled residual, relative divergence, and a scale of power.
-    fn norms(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> (f64, f64, f64) {
+    /// Scaled residual, relative divergence, what the penalty makes of the pressure relative to the
+    /// same scale, and a scale of power.
+    fn norms(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> (f64, f64, f64, f64) {
         let (mut rr, mut ff, mut uu) = (0.0, 0.0, 0.0);
         for node in 0..self.mesh.nodes() {
             for c in 0..D {
@@ -620,7 +620,13 @@ impl<const D: usize> Stokes<D> {
         let scale = ff.sqrt() + uu.sqrt() + PRESSURE_SHARE * r.pressure_norm.sqrt();
         let strain = r.strain.sqrt() + ff.sqrt() + RIGID_SHARE * uu.sqrt();
         let ratio = |a: f64, b: f64| if a == 0.0 { 0.0 } else { a / b };
-        (ratio(rr.sqrt(), scale), ratio(r.divergence_norm.sqrt(), strain), ff + RIGID_POWER * uu)
+        let stiffest = r.stiffest.max(f64::MIN_POSITIVE);
+        (
+            ratio(rr.sqrt(), scale),
+            ratio(r.divergence_norm.sqrt(), strain),
+            ratio(r.yielding.sqrt(), strain),
+            ff + RIGID_POWER * uu + r.pressure_square / stiffest,
+        )
     }
 
     /// Power of the loads and of the reactions on moving boundaries.
