@@ -7,6 +7,8 @@ use std::fmt;
 pub enum Warning {
     /// Inertia would matter for these numbers, and is not solved.
     Inertia { reynolds: f64 },
+    /// A dense fluid in one that is far thinner.
+    ThinFluid { dense: String, thin: String, ratio: f64 },
     /// Layers that resist shear more than the matrix.
     StiffLayers { material: String, ratio: f64 },
     /// A coupling viscosity without an internal length, or the other way round.
@@ -34,6 +36,12 @@ impl fmt::Display for Warning {
                 f,
                 "inertia is not solved, but these numbers have a Reynolds number of {reynolds:.1e}: \
                  read the result as the creeping flow of a scaled, more viscous scene"
+            ),
+            Warning::ThinFluid { dense, thin, ratio } => write!(
+                f,
+                "`{dense}` is {ratio:.0e} times as viscous as the lighter `{thin}`: drops of it that \
+                 come loose fall far faster than it flows, and steps become as short; with a \
+                 ratio of 1e3 or 1e4 it flows much alike"
             ),
             Warning::StiffLayers { material, ratio } => write!(
                 f,

@@ -5,20 +5,15 @@ use super::*;
 #[test]
 fn the_quick_battery_holds() {
     let here = TempFolder::new();
-    // Not mended yet: a power of rounding is not told from one of the flow, and giant steps shift
-    // the projected rim of a coarse drop by 6 % of its area.
-    let known = ["heavy fluid at rest, one giant step", "falling drop, 50 cells a step"];
-    let said = here.grainscope(&["stress", "--quick", "--json"]).exits(6);
+    let said = here.grainscope(&["stress", "--quick", "--json"]).exits(0);
     let found = said.json();
     let outcomes = found["outcomes"].as_array().expect("outcomes");
     assert!(outcomes.len() > 30 && found["criteria"]["divergence"].is_f64());
     for o in outcomes {
-        let name = o["name"].as_str().expect("a name");
-        let known = known.iter().any(|k| name.starts_with(k));
-        assert!(o["verdict"].get("fail").is_none() || known, "{o}");
+        assert!(o["verdict"].get("fail").is_none(), "{o}");
         assert!(o["checks"].as_array().is_some_and(|c| c.len() > 8), "{o}");
     }
-    assert!(here.has("stress-failures"));
+    assert!(!here.has("stress-failures"));
 }
 
 #[test]
