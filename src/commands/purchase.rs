@@ -1,6 +1,7 @@
 //! `run --accuracy` and `run --budget`: settings bought from a price list.
 
 use super::{Failure, cost};
+use crate::cost::measure::Pilot;
 use crate::cost::report::{percent, seconds};
 use crate::cost::{Entry, List};
 use crate::record::summary::Purchase;
@@ -35,6 +36,8 @@ pub fn budget(text: &str) -> Result<f64, String> {
 pub struct Bought {
     pub entry: Entry,
     list: List,
+    /// Seconds of the wall.
+    expected: f64,
     /// Seconds, if that was the wish.
     budget: Option<f64>,
 }
@@ -49,13 +52,15 @@ pub fn buy(
         return Ok(None);
     }
     let list = cost::to_buy_from(source)?;
+    let pace = pace(source, &list)?;
+    let expected = |e: &Entry| pace * list.expected_seconds(e);
     let entry = match (accuracy, budget) {
         (Some(wanted), _) => list.for_accuracy(wanted).map_err(|best| {
             let best = best.map_or("there is nothing to buy".into(), |e| {
                 format!(
                     "the best is {} for about {}: {}",
                     percent(e.promised),
-                    seconds(list.expected_seconds(e)),
+                    seconds(expected(e)),
                     e.label
                 )
             });
@@ -65,11 +70,11 @@ pub fn buy(
         }),
         (None, wanted) => {
             let wanted = wanted.unwrap_or(f64::INFINITY);
-            list.for_budget(wanted).map_err(|fastest| {
+            list.for_budget(wanted, pace).map_err(|fastest| {
                 let fastest = fastest.map_or("there is nothing to buy".into(), |e| {
                     format!(
                         "the fastest takes about {} for {}: {}",
-                        seconds(list.expected_seconds(e)),
+                        seconds(expected(e)),
                         percent(e.promised),
                         e.label
                     )
@@ -86,10 +91,28 @@ pub fn buy(
         percent(entry.promised),
         entry.limiting(),
         list.sampling.map_or(String::new(), |s| format!("; sampling {}", percent(s))),
-        seconds(list.expected_seconds(&entry))
+        seconds(expected(&entry))
     );
-    Ok(Some(Bought { entry, list, budget }))
+    Ok(Some(Bought { expected: expected(&entry), entry, list, budget }))
 }
+
+/// Seconds of a few steps.
+const PATIENCE: f64 = 0.5;
+
+/// How many times longer a step takes now than when the list was made: other work on the machine,
+/// another frequency.
+fn pace(source: &SceneSource, list: &List) -> Result<f64, Failure> {
+    let Some(entry) = list.front().next() else { return Ok(1.0) };
+    let (_, plan) = super::resolve(&source.with_sets(&entry.sets)?)?;
+    let now = Pilot::run(std::sync::Arc::new(plan), PATIENCE)?;
+    let then = list.step_seconds(entry);
+    // Of runs that are a start and little more, steps say nothing.
+    let known = now.step > 0.0 && then > 0.0 && entry.steps >= LEAST_STEPS;
+    Ok(if known { (now.step_wall / then).max(1.0) } else { 1.0 })
+}
+
+/// Fewest steps of an entry that tell its pace.
+const LEAST_STEPS: u64 = 5;
 
 impl Bought {
     /// Whether a further step, as long as the last one, would exceed the budget. Closing the files
@@ -118,8 +141,9 @@ impl Bought {
             quantity: self.list.quantity.clone(),
             accuracy: self.entry.promised,
             sampling: self.list.sampling,
-            expected_seconds: self.list.expected_seconds(&self.entry),
+            expected_seconds: self.expected,
             seconds: wall,
+            finished: run.is_finished(),
             bars: bars.collect(),
         }
     }
@@ -135,6 +159,10 @@ pub fn receipt_text(p: &Purchase) -> String {
         seconds(p.expected_seconds),
         seconds(p.seconds)
     );
+    if !p.finished {
+        out += "  unfinished: what was bought is promised of a whole run, not of this part of one; a \
+                larger budget, or a shorter time.end, brings it to the end\n";
+    }
     for (name, [error, sampling]) in &p.bars {
         out += &format!(
             "  gauge {name}: +- {error:.2e} m2 (discretisation) +- {sampling:.2e} m2 (sampling)\n"

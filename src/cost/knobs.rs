@@ -59,7 +59,7 @@ impl Knob {
 
 /// Whole numbers near `n` times powers of `sqrt 2`, even if `n` is: an interface that lies on a
 /// mesh line of the scene's own mesh stays on one.
-fn cells_near(n: u32, factor: f64) -> u32 {
+pub(super) fn cells_near(n: u32, factor: f64) -> u32 {
     let wanted = f64::from(n) * factor;
     let even = 2.0 * (0.5 * wanted).round();
     // Of few cells the next even number may be quite another resolution.

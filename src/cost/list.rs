@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
 /// Version of the format.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// Everything that was found.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -41,6 +41,9 @@ pub struct List {
     pub skipped: Vec<String>,
     /// Seconds of a whole run of the scene over those of what was measured.
     pub whole_run: f64,
+    /// Where runs were shortened: difference of two coarse runs at the scene's end over that at the
+    /// horizon, and their cells; `None` if there was no time for them.
+    pub growth: Option<Growth>,
     /// Seconds that the list took to make.
     pub made_in: f64,
 }
@@ -54,6 +57,20 @@ pub struct Machine {
     pub pinned: Option<String>,
     /// Processor time is told by the system, not taken from the wall's clock.
     pub cpu_clock: bool,
+}
+
+/// How an error grows from the horizon to the end of the scene.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Growth {
+    pub factor: f64,
+    pub cells: [u32; 2],
+}
+
+impl Growth {
+    /// Promises are for the end: errors that shrink later are promised as they were measured.
+    pub fn of_promises(&self) -> f64 {
+        self.factor.max(1.0)
+    }
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -151,9 +168,9 @@ impl List {
         self.front().find(|e| e.promised <= than.promised && e.cpu <= than.cpu)
     }
 
-    /// Seconds of the wall that a whole run of an entry is expected to take.
+    /// Seconds of a processor that a whole run of an entry is expected to take.
     pub fn expected_seconds(&self, entry: &Entry) -> f64 {
-        entry.wall * self.whole_run
+        entry.cpu * self.whole_run
     }
 
     /// The cheapest entry that keeps an accuracy; else the most accurate.
@@ -162,10 +179,16 @@ impl List {
         good.ok_or_else(|| self.front().min_by(|a, b| a.promised.total_cmp(&b.promised)))
     }
 
-    /// The most accurate entry whose whole run is expected to end in time; else the fastest.
-    pub fn for_budget(&self, seconds: f64) -> Result<&Entry, Option<&Entry>> {
+    /// Seconds of a step, start and all.
+    pub fn step_seconds(&self, entry: &Entry) -> f64 {
+        entry.cpu / (entry.steps + 1) as f64
+    }
+
+    /// The most accurate entry whose whole run is expected to end in time; else the fastest. `pace`:
+    /// how many times longer than then a step takes now.
+    pub fn for_budget(&self, seconds: f64, pace: f64) -> Result<&Entry, Option<&Entry>> {
         // Room for recording, plots and the machine's noise.
-        let room = 1.1 * (1.0 + self.noise.wall.min(0.3));
+        let room = 1.1 * (1.0 + self.noise.wall.min(0.3)) * pace;
         let fits = |e: &&Entry| room * self.expected_seconds(e) <= seconds;
         let best = self.front().filter(fits).min_by(|a, b| a.promised.total_cmp(&b.promised));
         best.ok_or_else(|| self.front().min_by(|a, b| a.cpu.total_cmp(&b.cpu)))
@@ -319,6 +342,7 @@ pub(super) mod tests {
             failed: vec![],
             skipped: vec![],
             whole_run: 2.0,
+            growth: Some(Growth { factor: 1.5, cells: [2, 3] }),
             made_in: 1.0,
         }
     }
@@ -333,10 +357,11 @@ pub(super) mod tests {
             list.for_accuracy(1e-5).expect_err("out of reach").map(|e| e.label.as_str()),
             Some("fine")
         );
-        assert_eq!(label(list.for_budget(20.0)).as_deref(), Some("fine"));
-        assert_eq!(label(list.for_budget(3.0)).as_deref(), Some("base"));
+        assert_eq!(label(list.for_budget(20.0, 1.0)).as_deref(), Some("fine"));
+        assert_eq!(label(list.for_budget(3.0, 1.0)).as_deref(), Some("base"));
+        assert_eq!(label(list.for_budget(20.0, 3.0)).as_deref(), Some("base"), "a slower day");
         assert_eq!(
-            list.for_budget(0.1).expect_err("too little").map(|e| e.label.as_str()),
+            list.for_budget(0.1, 1.0).expect_err("too little").map(|e| e.label.as_str()),
             Some("coarse")
         );
         assert_eq!(list.dominated()[0].label, "bad");

@@ -238,6 +238,8 @@ pub struct Pilot {
     /// Seconds of set-up and first solution, of a processor.
     pub start: f64,
     pub step: f64,
+    /// Seconds of the wall for a step.
+    pub step_wall: f64,
     pub steps: f64,
 }
 
@@ -251,21 +253,25 @@ impl Pilot {
         let (run, start) = timed(|| sim::start(plan.clone()));
         let mut run = run?;
         let end = plan.clock.end * plan.units.time;
-        let (mut seconds, mut count) = (vec![], 0);
+        let (mut cpu, mut wall, mut count) = (vec![], vec![], 0);
         while !run.is_finished()
             && (count < 3 || count < PILOT_STEPS && clock.elapsed().as_secs_f64() < patience)
         {
             let (outcome, took) = timed(|| run.step());
             outcome?;
-            seconds.push(took.cpu);
+            cpu.push(took.cpu);
+            wall.push(took.wall);
             count += 1;
         }
         let row = run.row();
         let left = if row.dt > 0.0 { (end - row.time) / row.dt } else { 0.0 };
         // The first step solves twice; the median does not see it.
-        seconds.sort_by(f64::total_cmp);
-        let step = seconds.get(seconds.len() / 2).copied().unwrap_or(0.0);
-        Ok(Pilot { start: start.cpu, step, steps: f64::from(count) + left.max(0.0) })
+        let median = |mut seconds: Vec<f64>| {
+            seconds.sort_by(f64::total_cmp);
+            seconds.get(seconds.len() / 2).copied().unwrap_or(0.0)
+        };
+        let (step, step_wall) = (median(cpu), median(wall));
+        Ok(Pilot { start: start.cpu, step, step_wall, steps: f64::from(count) + left.max(0.0) })
     }
 
     /// Seconds of the whole run.

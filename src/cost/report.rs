@@ -89,9 +89,20 @@ fn horizon(list: &List) -> String {
     if short == 0.0 {
         format!("the first solution; a whole run takes {:.3} times as long", list.whole_run)
     } else if short < full {
+        let growth = match &list.growth {
+            Some(g) => format!(
+                "its error is {:.2} times as large (two meshes of {} and {} cells at the end and at \
+                 that time{})",
+                g.factor,
+                g.cells[0],
+                g.cells[1],
+                if g.factor > 1.0 { "; promises count it" } else { "; promises do not" }
+            ),
+            None => "its error is taken to be the same".into(),
+        };
         format!(
             "runs shortened to t = {short:.4e} of {full:.4e} s; a whole run takes about {:.1} times \
-             as long, and its error is taken to be the same",
+             as long, and {growth}",
             list.whole_run
         )
     } else {

@@ -2,8 +2,10 @@
 
 use super::CostError;
 use super::front::{self, Offer, Power};
-use super::knobs::{Design, rung};
-use super::list::{Entry, GaugeLine, KnobLine, List, Machine, Noise, ReferenceLine, SCHEMA};
+use super::knobs::{Design, cells_near, rung};
+use super::list::{
+    Entry, GaugeLine, Growth, KnobLine, List, Machine, Noise, ReferenceLine, SCHEMA,
+};
 use super::measure::{Pilot, Sample, Target, run};
 use super::reference::{Kind, Reference};
 use crate::cases::exact_of;
@@ -74,6 +76,11 @@ const REPEATS: [(f64, usize); 3] = [(0.1, 5), (0.4, 3), (1.0, 2)];
 /// Seeds whose spread is the sampling error.
 const SEEDS: [u64; 3] = [11, 12, 13];
 
+/// Cells of the coarse meshes that run to the end, relative to the scene's own, and the share of
+/// the time that may be spent on them.
+const COARSE: [f64; 2] = [1.0 / 3.0, 0.5];
+const COARSE_SHARE: f64 = 0.25;
+
 /// Errors below this are rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -95,6 +102,8 @@ struct Survey<'a> {
     ran: Vec<Ran>,
     failed: Vec<String>,
     skipped: Vec<String>,
+    /// From the horizon to the scene's end.
+    growth: Option<Growth>,
 }
 
 /// Plans a source with sets.
@@ -167,10 +176,13 @@ pub fn price(
         ran: vec![],
         failed: vec![],
         skipped: vec![],
+        growth: None,
     };
     let noise = survey.base()?;
     let base = survey.ran[0].sample.clone();
     let mut gauges = vec![];
+    let whole = if horizon < full { survey.to_the_end(source, &scene, &pilot)? } else { None };
+    survey.growth = whole.map(|w| w.0);
     let reference = match exact {
         Some(exact) => {
             let at = |p: [f64; 2]| ((exact.velocity)(p[0], p[1]), (exact.pressure)(p[0], p[1]));
@@ -187,10 +199,10 @@ pub fn price(
     for _ in 0..survey.limits.rounds {
         survey.combine(&reference)?;
     }
-    let whole_run = match survey.target.at {
-        Moment::Start => pilot.whole() / base.took.cpu.max(1e-9),
-        _ if horizon < full => pilot.whole() / base.took.cpu.max(1e-9),
-        _ => 1.0,
+    let whole_run = match (whole, survey.target.at) {
+        (Some((_, ratio)), _) => ratio,
+        (None, Moment::End | Moment::Peak) if horizon == full => 1.0,
+        _ => pilot.whole() / base.took.cpu.max(1e-9),
     };
     let names = plan.gauges.iter().map(|g| g.name.clone());
     let gauge_lines = names
@@ -229,6 +241,7 @@ pub fn price(
         failed: survey.failed,
         skipped: survey.skipped,
         whole_run,
+        growth: survey.growth,
         made_in: clock.elapsed().as_secs_f64(),
     })
 }
@@ -299,6 +312,44 @@ impl Survey<'_> {
         let noise = Noise { cpu: spread(0), wall: spread(1), repeats: took.len() };
         self.ran.push(Ran { settings, sample, repeats: took.len() });
         Ok(noise)
+    }
+
+    /// What shortening leaves out, seen on two coarse meshes that run to the end as well: how errors
+    /// grow, and how many times longer whole runs take. `None` if there is no time for it.
+    fn to_the_end(
+        &mut self,
+        source: &SceneSource,
+        scene: &Scene,
+        pilot: &Pilot,
+    ) -> Result<Option<(Growth, f64)>, CostError> {
+        let cells = COARSE.map(|f| cells_near(scene.accuracy.cells, f));
+        // Cells count to the power two, and once more for the steps.
+        let guess: f64 = COARSE.iter().map(|f| f.powf(2.5)).sum::<f64>() * pilot.whole();
+        if cells[0] == cells[1] || guess > COARSE_SHARE * self.limits.total {
+            return Ok(None);
+        }
+        let short = self.source.clone();
+        let mut found: Vec<[Sample; 2]> = vec![];
+        for n in cells {
+            let sets = [format!("accuracy.cells={n}")];
+            let label = format!("to the end with {n} cells");
+            let near = self.sample(&label, &sets)?;
+            self.source = source.clone();
+            let far = self.sample(&label, &sets);
+            self.source = short.clone();
+            let (Some(near), Some(far)) = (near, far?) else { return Ok(None) };
+            (self.say)(&format!("  {label}: {:.3} s of processor", far.took.cpu));
+            found.push([near, far]);
+        }
+        let difference = |k: usize| {
+            let [a, b] = [&found[0][k].value, &found[1][k].value];
+            let scale = self.target.size(b.iter().copied()).max(self.target.floor);
+            self.target.distance(a, b, scale)
+        };
+        let (near, far) = (difference(0), difference(1));
+        let factor = if near > ROUNDING { far / near } else { 1.0 };
+        let ratio = found[1][1].took.cpu / found[1][0].took.cpu.max(1e-9);
+        Ok(Some((Growth { factor, cells }, ratio)))
     }
 
     /// The reference where nothing is exact: a coarser and a finer rung beside the scene's own.
@@ -540,6 +591,7 @@ impl Survey<'_> {
             })
             .collect();
         let adds: Vec<Vec<Option<f64>>> = found.into_iter().map(|f| f.0).collect();
+        let growth = self.growth.map_or(1.0, |g| g.of_promises());
         let mut entries: Vec<Entry> = self
             .ran
             .iter()
@@ -555,7 +607,7 @@ impl Survey<'_> {
                     label: self.design.label(&r.settings),
                     sets: self.design.sets(&r.settings),
                     error,
-                    promised: error.max(trusted) + reference.uncertainty,
+                    promised: growth * (error.max(trusted) + reference.uncertainty),
                     lucky: error < 0.4 * trusted,
                     cpu: s.took.cpu,
                     wall: s.took.wall,

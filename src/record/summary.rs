@@ -68,6 +68,8 @@ pub struct Purchase {
     pub sampling: Option<f64>,
     pub expected_seconds: f64,
     pub seconds: f64,
+    /// Whether the run reached its end; before it, nothing is promised.
+    pub finished: bool,
     /// Error bars of the gauges' volumes, m2: discretisation, sampling.
     pub bars: IndexMap<String, [f64; 2]>,
 }
