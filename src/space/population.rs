@@ -18,6 +18,11 @@ use super::seeding::Seeding;
 use super::walls::Enclosure;
 use crate::laws::director;
 
+/// Particles of this share of the usual volume are split before smaller ones, which would make
+/// volumes ever more unequal: after 10,000 steps of a steady vortex, cells of 16 were off by 1.01 rows
+/// of particles with a quarter, and are by 0.91 with this (at random places they would be by 0.8).
+const SPLIT: f64 = 0.7;
+
 /// Shifted particles stay within this, in half cells.
 const INSIDE: f64 = 0.999;
 
@@ -66,7 +71,7 @@ impl Population {
             }
             let nominal = mesh.cell_area(cell) / self.target() as f64;
             while let Some(gap) = self.gap(mesh, particles, cell, &members, least) {
-                let parent = nearest(mesh, particles, cell, &members, gap, 0.25 * nominal);
+                let parent = nearest(mesh, particles, cell, &members, gap, SPLIT * nominal);
                 particles.volume[parent] *= 0.5;
                 particles.duplicate(parent);
                 let child = particles.len() - 1;
