@@ -34,6 +34,7 @@
 
 pub mod cases;
 pub mod commands;
+pub mod compare;
 pub mod cost;
 pub mod frame;
 pub mod laws;

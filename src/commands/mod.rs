@@ -1,6 +1,7 @@
 //! The command line: the top floor, which nothing imports.
 
 mod check;
+mod compare;
 mod cost;
 mod cost_page;
 mod plan;
@@ -78,6 +79,8 @@ enum Command {
     Stress(stress::Args),
     /// Measure what accuracy costs: a price list of settings
     Cost(cost::Args),
+    /// Compare runs: values, curves, fields, scenes, and one recording side by side
+    Compare(compare::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -176,6 +179,7 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Stress(args) => stress::run(&args),
         Command::Cost(args) => cost::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

@@ -124,7 +124,7 @@ fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
 }
 
 /// The first interrupt ends the run after its step; a second one ends the program.
-fn watch_interrupts(flag: &Arc<AtomicBool>) {
+pub(super) fn watch_interrupts(flag: &Arc<AtomicBool>) {
     let flag = flag.clone();
     let watching = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::SeqCst) {
