@@ -4,6 +4,7 @@ mod check;
 mod compare;
 mod cost;
 mod cost_page;
+mod figure;
 mod plan;
 mod presets;
 mod purchase;
@@ -81,6 +82,8 @@ enum Command {
     Cost(cost::Args),
     /// Compare runs: values, curves, fields, scenes, and one recording side by side
     Compare(compare::Args),
+    /// Make a figure of the source: runs, plots, snapshots, a recording side by side
+    Figure(figure::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -180,6 +183,7 @@ pub fn main() -> ExitCode {
         Command::Stress(args) => stress::run(&args),
         Command::Cost(args) => cost::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Figure(args) => figure::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

@@ -145,6 +145,7 @@ fn values(members: &[Member], time: f64, notes: &mut Vec<String>) -> Vec<Value> 
             keys.push(key);
         }
     }
+    keys.sort_by_key(|key| table::importance(key));
     let list = keys.into_iter().map(|key| {
         let values: Vec<Option<f64>> = at_time
             .iter()

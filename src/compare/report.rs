@@ -1,6 +1,7 @@
 //! A comparison in words: for the terminal, and as Markdown for the recording's panels.
 
 use super::{Comparison, fields, short};
+use crate::record::number::trim_zeros;
 use crate::record::text::duration;
 
 /// Most rows of changes in scenes that the terminal shows.
@@ -76,7 +77,7 @@ pub fn markdown(c: &Comparison) -> [(&'static str, String); 2] {
         let line = |cells: &[String]| {
             format!("| {} |\n", cells.iter().map(escaped).collect::<Vec<_>>().join(" | "))
         };
-        let mut out = format!("## {}\n\n{}", grid.title, line(&grid.head));
+        let mut out = format!("#### {}\n\n{}", grid.title, line(&grid.head));
         out += &format!("|{}\n", "---|".repeat(grid.head.len()));
         out += &grid.rows.iter().map(|row| line(row)).collect::<String>();
         out + "\n"
@@ -208,7 +209,7 @@ fn number(value: f64) -> String {
     let exponent = value.abs().log10().floor();
     if (-3.0..6.0).contains(&exponent) {
         let decimals = (4.0 - exponent).max(0.0) as usize;
-        format!("{value:.decimals$}")
+        trim_zeros(&format!("{value:.decimals$}")).to_owned()
     } else {
         format!("{value:.4e}")
     }

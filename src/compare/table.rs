@@ -124,6 +124,27 @@ fn column(path: &str, gauges: usize) -> Option<String> {
     })
 }
 
+/// The rank of a column for a reader: what runs are made for comes first.
+pub fn importance(key: &str) -> usize {
+    const ORDER: [&str; 12] = [
+        "outflow_volume",
+        "outflow_rate",
+        "mean_alignment",
+        "max_speed",
+        "rms_speed",
+        "dissipation",
+        "dissipated",
+        "potential_energy",
+        "volume_drift",
+        "end",
+        "step",
+        "particles",
+    ];
+    let name = key.rsplit('.').next().unwrap_or(key);
+    let last = if key == SECONDS { ORDER.len() + 1 } else { ORDER.len() };
+    ORDER.iter().position(|o| *o == name).unwrap_or(last)
+}
+
 /// The unit of a column.
 pub fn unit(key: &str) -> &'static str {
     match key.rsplit('.').next().unwrap_or(key) {
