@@ -1,7 +1,7 @@
 //! Differences of fields. Particles of two runs have no one-to-one match; fields on a common grid
 //! do.
 
-use super::{Member, later, short};
+use super::{Member, later};
 use crate::frame::{GridField, Quantity, Rect};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -164,9 +164,4 @@ fn reach(pictures: &[(f64, GridField)]) -> f32 {
 pub fn title(members: &[Member], runs: [usize; 2]) -> String {
     let [a, b] = runs.map(|k| &members[k].name);
     format!("{b} − {a}")
-}
-
-/// How a change reads.
-pub fn text(change: &FieldChange) -> String {
-    format!("{} %", short(100.0 * change.largest))
 }

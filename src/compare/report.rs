@@ -1,6 +1,6 @@
 //! A comparison in words: for the terminal, and as Markdown for the recording's panels.
 
-use super::{Comparison, fields, short};
+use super::{Comparison, short};
 use crate::record::number::trim_zeros;
 use crate::record::text::duration;
 
@@ -137,22 +137,7 @@ fn grids(c: &Comparison) -> Vec<Grid> {
         rows: c.values.iter().filter(|v| !is_technical(&v.key)).map(value_row).collect(),
     }];
     if !c.curves.is_empty() || !c.fields.is_empty() {
-        let curves = c.curves.iter().filter(|c| !is_technical(&c.key)).map(|change| {
-            [&change.key, &change.run, &percent(change.largest), &at(change.at)]
-                .map(String::from)
-                .to_vec()
-        });
-        let fields = c.fields.iter().map(|change| {
-            let name = format!("field of {}", change.field);
-            [&name, &change.run, &fields::text(change), &at(change.at)].map(String::from).to_vec()
-        });
-        list.push(Grid {
-            title: "largest difference over time (curves: of the largest value; fields: root mean \
-                    squares)"
-                .into(),
-            head: ["of", "run", "difference", "at t (s)"].map(String::from).to_vec(),
-            rows: curves.chain(fields).collect(),
-        });
+        list.push(distances(c));
     }
     if !c.scenes.is_empty() {
         list.push(Grid {
@@ -171,12 +156,46 @@ fn grids(c: &Comparison) -> Vec<Grid> {
     list
 }
 
-fn is_technical(key: &str) -> bool {
-    TECHNICAL.contains(&key)
+/// A row for each curve and field, a column for each run but the first.
+fn distances(c: &Comparison) -> Grid {
+    let mut found: Vec<(String, &str, f64, f64)> = vec![];
+    for change in c.curves.iter().filter(|c| !is_technical(&c.key)) {
+        found.push((change.key.clone(), &change.run, change.largest, change.at));
+    }
+    for change in &c.fields {
+        let name = format!("field of {}", change.field);
+        found.push((name, &change.run, change.largest, change.at));
+    }
+    let mut names: Vec<&String> = vec![];
+    for (name, ..) in &found {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let others = || c.runs.iter().skip(1).map(|run| run.name.as_str());
+    let cell = |name: &String, run: &str| {
+        let one = found.iter().find(|(n, r, ..)| n == name && *r == run);
+        one.map_or("-".to_owned(), |(_, _, largest, at)| match largest {
+            0.0 => "=".to_owned(),
+            _ => format!("{} at {} s", percent(*largest), short(*at)),
+        })
+    };
+    Grid {
+        title:
+            "largest difference over time (curves: of the largest value; fields: root mean squares)"
+                .into(),
+        head: std::iter::once("of").chain(others()).map(String::from).collect(),
+        rows: names
+            .into_iter()
+            .map(|name| {
+                std::iter::once(name.clone()).chain(others().map(|run| cell(name, run))).collect()
+            })
+            .collect(),
+    }
 }
 
-fn at(time: f64) -> String {
-    short(time)
+fn is_technical(key: &str) -> bool {
+    TECHNICAL.contains(&key)
 }
 
 fn percent(share: f64) -> String {

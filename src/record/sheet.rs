@@ -23,6 +23,9 @@ const GAP: f64 = 14.0;
 /// Particles cover squares of this many times their spacing, so that no paper shows between them.
 const OVERLAP: f32 = 1.35;
 
+/// Wider gaps between particles than this are gaps.
+const GAP_PIXELS: usize = 4;
+
 const LEVEL: RGBColor = RGBColor(0, 90, 150);
 const STROKE: RGBColor = RGBColor(150, 150, 155);
 
@@ -111,7 +114,7 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
             self.line(&[*a, *b], STROKE, 1.0)?;
         }
         for line in &picture.dye_lines {
-            self.line(line, INK, 1.0)?;
+            self.line(line, INK, 0.8)?;
         }
         for isoline in &picture.isolines {
             for strip in &isoline.strips {
@@ -227,7 +230,30 @@ impl Cover {
                 }
             }
         }
+        cover.close();
         cover
+    }
+
+    /// Fills gaps of a few pixels along a row or a column, which particles leave where the flow
+    /// stretches.
+    fn close(&mut self) {
+        let [nx, ny] = self.n;
+        let before = self.pixels.clone();
+        let rows = (0..ny).map(|j| (j * nx, 1, nx));
+        let columns = (0..nx).map(|i| (i, nx, ny));
+        for (start, stride, count) in rows.chain(columns) {
+            let mut last: Option<usize> = None;
+            for k in 0..count {
+                let class = before[start + k * stride];
+                if class == 0 {
+                    continue;
+                }
+                if let Some(last) = last.filter(|last| (2..=GAP_PIXELS + 1).contains(&(k - last))) {
+                    (last + 1..k).for_each(|k| self.pixels[start + k * stride] = class);
+                }
+                last = Some(k);
+            }
+        }
     }
 
     /// Lower left corner of a pixel.
