@@ -95,11 +95,8 @@ fn pair(
         };
         for (time, field) in a.iter().filter(|(t, _)| !later(*t, until)) {
             let Some(other) = at_time(b, *time) else { continue };
-            let (nx, ny) = (field.nx, field.ny);
-            let whole = domain == field.rect()
-                || members[0].info.as_ref().is_some_and(|i| i.domain == domain);
-            let base = if whole { field.clone() } else { field.on(domain, nx, ny) };
-            let other = other.on(domain, nx, ny);
+            let grid = [field.nx, field.ny];
+            let (base, other) = (on_grid(field, domain, grid), on_grid(&other, domain, grid));
             let values: Vec<f32> =
                 other.values.iter().zip(&base.values).map(|(b, a)| b - a).collect();
             let size = rms(&base.values);
@@ -120,6 +117,18 @@ fn pair(
         changes.push(change);
     }
     Pair { runs: [0, k], domain, quantities, frames, changes }
+}
+
+/// A field on the grid that is compared on; one that is there already is not interpolated.
+fn on_grid(field: &GridField, domain: Rect, [nx, ny]: [usize; 2]) -> GridField {
+    let rect = field.rect();
+    let near = |a: f32, b: f32, cell: f32| (a - b).abs() < 1e-3 * cell;
+    let same = (field.nx, field.ny) == (nx, ny)
+        && (0..2).all(|c| {
+            near(rect.min[c], domain.min[c], field.cell[c])
+                && near(rect.max[c], domain.max[c], field.cell[c])
+        });
+    if same { field.clone() } else { field.on(domain, nx, ny) }
 }
 
 /// A field at a time, between the pictures before and after; `None` outside.

@@ -11,8 +11,12 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::Path;
 
-/// Width of the whole sheet (pixels).
-const WIDTH: u32 = 1200;
+/// Width of the whole sheet (pixels), at most.
+const WIDTH: f64 = 1200.0;
+/// Width of a snapshot (pixels), at most.
+const SNAPSHOT: f64 = 380.0;
+/// Height of a snapshot (pixels), at most.
+const HEIGHT: f64 = 380.0;
 /// Room for the title and the heads of columns.
 const HEAD: f64 = 86.0;
 /// Room for the names of rows.
@@ -23,8 +27,11 @@ const GAP: f64 = 14.0;
 /// Particles cover squares of this many times their spacing, so that no paper shows between them.
 const OVERLAP: f32 = 1.35;
 
-/// Wider gaps between particles than this are gaps.
-const GAP_PIXELS: usize = 4;
+/// Gaps between particles wider than this share of a snapshot are gaps of the material.
+const WIDEST_GAP: f64 = 0.035;
+
+/// Level lines shorter than this share of the domain are noise of few particles.
+const SMALLEST_LINE: f32 = 0.06;
 
 const LEVEL: RGBColor = RGBColor(0, 90, 150);
 const STROKE: RGBColor = RGBColor(150, 150, 155);
@@ -49,7 +56,7 @@ pub struct Row {
 pub fn sheet(stem: &Path, sheet: &Sheet) -> Result<(), PlotError> {
     let (_, height) = sheet.snapshot();
     let full = HEAD + (height + GAP) * sheet.rows.len() as f64 + GAP;
-    write(stem, sheet, (WIDTH, full.ceil() as u32))
+    write(stem, sheet, (sheet.width().ceil() as u32, full.ceil() as u32))
 }
 
 impl Sheet {
@@ -61,10 +68,19 @@ impl Sheet {
     /// Width and height of a snapshot.
     fn snapshot(&self) -> (f64, f64) {
         let columns = self.columns.len().max(1) as f64;
-        let width = (f64::from(WIDTH) - self.side() - GAP * columns) / columns;
+        let width = ((WIDTH - self.side() - GAP * columns) / columns).min(SNAPSHOT);
         let domains = self.rows.iter().map(|row| row.info.domain).reduce(Rect::around);
         let [w, h] = domains.unwrap_or_default().size();
-        (width, if w > 0.0 { width * f64::from(h / w) } else { width })
+        let ratio = if w > 0.0 { f64::from(h / w) } else { 1.0 };
+        // Several rows are seen at once only if each is low.
+        let most = if self.rows.len() > 1 { HEIGHT } else { 2.0 * HEIGHT };
+        let width = if width * ratio > most { most / ratio } else { width };
+        (width, width * ratio)
+    }
+
+    /// Width of the whole sheet.
+    fn width(&self) -> f64 {
+        self.side() + (self.snapshot().0 + GAP) * self.columns.len().max(1) as f64
     }
 }
 
@@ -72,7 +88,7 @@ impl Drawing for Sheet {
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, pen: Pen) -> Drawn<B> {
         root.fill(&WHITE)?;
         let centre = Pos::new(HPos::Center, VPos::Center);
-        let middle = pen.px(f64::from(WIDTH) / 2.0);
+        let middle = pen.px(self.width() / 2.0);
         pen.text(root, &self.title, 24.0, (middle, pen.px(26.0)), centre)?;
         let (width, height) = self.snapshot();
         let left = |k: usize| self.side() + k as f64 * (width + GAP);
@@ -117,7 +133,7 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
             self.line(line, INK, 0.8)?;
         }
         for isoline in &picture.isolines {
-            for strip in &isoline.strips {
+            for strip in isoline.strips.iter().filter(|strip| self.is_seen(strip)) {
                 self.line(strip, LEVEL, 1.6)?;
             }
         }
@@ -164,10 +180,32 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
         self.pen.polyline(self.root, places, self.pen.stroke(color, width))
     }
 
+    /// Whether a level line is more than noise.
+    fn is_seen(&self, strip: &[[f32; 2]]) -> bool {
+        let [w, h] = self.info.domain.size();
+        let extent = |c: usize| {
+            let values = strip.iter().map(|p| p[c]);
+            values.clone().fold(f32::MIN, f32::max) - values.fold(f32::MAX, f32::min)
+        };
+        extent(0).max(extent(1)) > SMALLEST_LINE * w.max(h)
+    }
+
+    /// How far from the frame a point is, relative to the domain. Away from the middle, where lines
+    /// of all levels would have their numbers.
+    fn depth(&self, [x, y]: &[f32; 2]) -> f32 {
+        let Rect { min, max } = self.info.domain;
+        let [w, h] = self.info.domain.size();
+        let of = |v: f32, low: f32, high: f32, size: f32| ((v - low).min(high - v) / size).min(0.2);
+        of(*x, min[0], max[0], w).min(of(*y, min[1], max[1], h))
+    }
+
     /// The number of a level on its longest line, on a patch of paper.
     fn level(&self, level: f32, strips: &[Vec<[f32; 2]>]) -> Drawn<B> {
         let Some(longest) = strips.iter().max_by_key(|strip| strip.len()) else { return Ok(()) };
-        let Some(point) = longest.get(longest.len() / 5) else { return Ok(()) };
+        let Some(point) = longest.iter().max_by(|a, b| self.depth(a).total_cmp(&self.depth(b)))
+        else {
+            return Ok(());
+        };
         let (x, y) = self.at(*point);
         let (dx, dy) = (self.pen.px(17.0), self.pen.px(9.0));
         let patch = Rectangle::new([(x - dx, y - dy), (x + dx, y + dy)], WHITE.filled());
@@ -239,6 +277,7 @@ impl Cover {
     fn close(&mut self) {
         let [nx, ny] = self.n;
         let before = self.pixels.clone();
+        let widest = (WIDEST_GAP * nx as f64).ceil() as usize;
         let rows = (0..ny).map(|j| (j * nx, 1, nx));
         let columns = (0..nx).map(|i| (i, nx, ny));
         for (start, stride, count) in rows.chain(columns) {
@@ -248,7 +287,7 @@ impl Cover {
                 if class == 0 {
                     continue;
                 }
-                if let Some(last) = last.filter(|last| (2..=GAP_PIXELS + 1).contains(&(k - last))) {
+                if let Some(last) = last.filter(|last| (2..=widest + 1).contains(&(k - last))) {
                     (last + 1..k).for_each(|k| self.pixels[start + k * stride] = class);
                 }
                 last = Some(k);

@@ -68,10 +68,7 @@ fn tolerances_decide_and_the_first_difference_is_named() {
     let json = compare(&here, &[&far[..], &["--json"]].concat()).exits(6).json();
     let within: Vec<_> = json["tolerances"].as_array().expect("a list").iter().collect();
     assert_eq!(within.len(), 3);
-    assert_eq!(
-        within.iter().map(|t| t["within"] == true).collect::<Vec<_>>(),
-        [true, false, true]
-    );
+    assert_eq!(within.iter().map(|t| t["within"] == true).collect::<Vec<_>>(), [true, false, true]);
     assert_eq!(json["scenes"][0]["key"], "parameters.alpha.value");
     assert_eq!(json["schema"], 1);
 }
@@ -243,4 +240,36 @@ fn figures_are_made_by_one_command() {
         .filter(|name| !name.contains("/diag"))
         .collect();
     assert!(runs.len() >= 5, "{runs:?}");
+}
+
+/// Blocks of shell commands of a page.
+fn recipes(page: &str) -> Vec<String> {
+    let blocks = page.split("```sh\n").skip(1);
+    blocks.filter_map(|rest| Some(rest.split_once("```")?.0.to_owned())).collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn the_recipe_for_ci_works_as_it_is_written() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/ci.md");
+    let page = std::fs::read_to_string(page).expect("docs/ci.md");
+    let recipes = recipes(&page);
+    assert_eq!(recipes.len(), 2);
+    let here = TempFolder::new();
+    let program = Path::new(env!("CARGO_BIN_EXE_grainscope")).parent().expect("a folder");
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
+    let shell = |script: &str| {
+        let mut shell = Command::new("sh");
+        shell.args(["-e", "-c", script]).current_dir(here.path("")).env("PATH", &path);
+        let output = shell.output().expect("a shell");
+        Said::new(&[script], output)
+    };
+    shell(&recipes[0]).exits(0);
+    shell(&recipes[1]).exits(0);
+    assert!(here.has("silo.rrd"));
+    assert_eq!(here.json("comparison.json")["runs"][1]["identical"], true);
+    // Something has changed.
+    let changed = recipes[1].replace("run silo", "run silo --force --set alpha=5/3");
+    shell(&changed).exits(6).complains(&["outflow_volume of ci", "of silo", "1 %"]);
+    assert_eq!(here.json("comparison.json")["tolerances"][0]["within"], false);
 }

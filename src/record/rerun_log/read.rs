@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use rerun::external::re_log_encoding::DecoderApp;
+use rerun::external::re_log_encoding::{DecoderApp, RRD_FOURCC, StreamFooter};
 use rerun::external::re_log_types::{StoreKind, TimelineName};
 use rerun::log::{Chunk, LogMsg};
 use rerun::{archetypes, components};
@@ -74,13 +74,14 @@ pub(super) fn below_run(chunk: &Chunk) -> Option<(String, Vec<String>)> {
 impl Recorded {
     /// Reads a file. One that is cut gives what precedes the cut.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let file =
-            File::open(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
+        let opened = |source| ReadError::Open { path: path.to_owned(), source };
+        let mut file = File::open(path).map_err(opened)?;
+        let closed = is_closed(&mut file).map_err(opened)?;
         let unreadable = |cause: String| ReadError::Unreadable { path: path.to_owned(), cause };
         let messages = DecoderApp::decode_eager(BufReader::new(file))
             .map_err(|e| unreadable(e.to_string()))?;
         let mut chunks = Vec::new();
-        let mut cut = None;
+        let mut cut = (!closed).then(|| "its end is missing".to_owned());
         for message in messages {
             let chunk = match message {
                 Ok(LogMsg::ArrowMsg(store, message)) if store.kind() == StoreKind::Recording => {
@@ -184,6 +185,20 @@ impl Recorded {
         }
         fields
     }
+}
+
+/// Whether a file has the footer that is written when a recording is closed. The decoder takes an
+/// end without one for an end.
+fn is_closed(file: &mut File) -> std::io::Result<bool> {
+    // It ends with its two names and the number of its entries.
+    const TAIL: i64 = 12;
+    let mut names = [0; 8];
+    if file.metadata()?.len() > TAIL.unsigned_abs() {
+        file.seek(SeekFrom::End(-TAIL))?;
+        file.read_exact(&mut names)?;
+    }
+    file.rewind()?;
+    Ok(names == [RRD_FOURCC, StreamFooter::RRD_IDENTIFIER].concat().as_slice())
 }
 
 /// Seconds on a timeline of the rows that hold a component.
