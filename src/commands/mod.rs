@@ -50,6 +50,7 @@ Examples:
   grainscope run silo                                   discharge of a silo, recorded
   grainscope run presets/silo.toml --set alpha=5/3 --out runs/stiff
   grainscope run shear_alignment --save align.rrd --serve   save and watch at once
+  grainscope compare runs/silo runs/stiff               side by side, and how they differ
   grainscope plan silo                                  which effects are solved, and why
   grainscope presets show silo                          the scene as TOML";
 

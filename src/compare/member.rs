@@ -54,11 +54,12 @@ struct Summary {
     error: Option<String>,
     steps: u64,
     time: f64,
-    max_speed: f64,
-    rms_speed: f64,
+    // Numbers that are not finite are null in JSON.
+    max_speed: Option<f64>,
+    rms_speed: Option<f64>,
     particles: u64,
     gauges: IndexMap<String, Gauge>,
-    volume_drift: IndexMap<String, f64>,
+    volume_drift: IndexMap<String, Option<f64>>,
     #[serde(default)]
     mean_alignment: Option<f64>,
     #[serde(default)]
@@ -67,8 +68,8 @@ struct Summary {
 
 #[derive(Clone, Debug, Deserialize)]
 struct Gauge {
-    volume: f64,
-    rate: f64,
+    volume: Option<f64>,
+    rate: Option<f64>,
 }
 
 /// A run that was read.
@@ -343,9 +344,11 @@ impl Summary {
     /// Numbers under the names that the series gives them.
     fn values(&self) -> IndexMap<String, f64> {
         let mut values = IndexMap::new();
-        let mut put = |key: &str, value: f64| values.insert(key.to_string(), value);
-        put("step", self.steps as f64);
-        put("particles", self.particles as f64);
+        let mut put = |key: &str, value: Option<f64>| {
+            values.extend(value.map(|value| (key.to_string(), value)));
+        };
+        put("step", Some(self.steps as f64));
+        put("particles", Some(self.particles as f64));
         for (name, gauge) in &self.gauges {
             let prefix = if self.gauges.len() > 1 { format!("{name}.") } else { String::new() };
             put(&format!("{prefix}outflow_volume"), gauge.volume);
@@ -353,9 +356,7 @@ impl Summary {
         }
         put("max_speed", self.max_speed);
         put("rms_speed", self.rms_speed);
-        if let Some(alignment) = self.mean_alignment {
-            put("mean_alignment", alignment);
-        }
+        put("mean_alignment", self.mean_alignment);
         for (material, drift) in &self.volume_drift {
             put(&format!("{material}.volume_drift"), *drift);
         }

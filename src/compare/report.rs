@@ -77,7 +77,7 @@ pub fn markdown(c: &Comparison) -> [(&'static str, String); 2] {
         let line = |cells: &[String]| {
             format!("| {} |\n", cells.iter().map(escaped).collect::<Vec<_>>().join(" | "))
         };
-        let mut out = format!("#### {}\n\n{}", grid.title, line(&grid.head));
+        let mut out = format!("**{}**\n\n{}", grid.title, line(&grid.head));
         out += &format!("|{}\n", "---|".repeat(grid.head.len()));
         out += &grid.rows.iter().map(|row| line(row)).collect::<String>();
         out + "\n"

@@ -308,7 +308,13 @@ impl Writer<'_> {
             .iter()
             .map(|(title, _, contents)| {
                 let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
-                self.curves(title, "/", &contents, components::Corner2D::LeftTop)
+                // What accumulates leaves room below, what fades leaves room above.
+                let corner = if title.contains("volume") {
+                    components::Corner2D::RightBottom
+                } else {
+                    components::Corner2D::RightTop
+                };
+                self.curves(title, "/", &contents, corner)
             })
             .collect()
     }
