@@ -7,6 +7,9 @@ use crate::record::text::duration;
 /// Most rows of changes in scenes that the terminal shows.
 const MOST_CHANGES: usize = 40;
 
+/// Longest cell that the terminal shows whole.
+const LONGEST_CELL: usize = 40;
+
 /// Diagnostics of the method rather than of the flow.
 const TECHNICAL: [&str; 9] = [
     "power_in",
@@ -39,7 +42,10 @@ pub fn terminal(c: &Comparison) -> String {
     }
     for grid in grids(c) {
         out += &format!("\n{}\n", grid.title);
-        let all: Vec<&Vec<String>> = std::iter::once(&grid.head).chain(&grid.rows).collect();
+        let all: Vec<Vec<String>> = std::iter::once(&grid.head)
+            .chain(&grid.rows)
+            .map(|row| row.iter().map(|cell| cut(cell)).collect())
+            .collect();
         let widths: Vec<usize> = (0..grid.head.len())
             .map(|k| all.iter().map(|row| row[k].chars().count()).max().unwrap_or(0))
             .collect();
@@ -220,10 +226,19 @@ fn value_row(value: &super::Value) -> Vec<String> {
     [value.key.clone(), unit.to_owned()].into_iter().chain(cells).collect()
 }
 
+/// The beginning of what is too long for a cell.
+fn cut(cell: &str) -> String {
+    if cell.chars().count() <= LONGEST_CELL {
+        return cell.to_owned();
+    }
+    cell.chars().take(LONGEST_CELL - 1).chain(['…']).collect()
+}
+
 /// Five digits; whole numbers whole.
 fn number(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e9 {
-        return value.to_string();
+        // Without the sign of a negative zero.
+        return (value + 0.0).to_string();
     }
     let exponent = value.abs().log10().floor();
     if (-3.0..6.0).contains(&exponent) {
@@ -231,5 +246,27 @@ fn number(value: f64) -> String {
         trim_zeros(&format!("{value:.decimals$}")).to_owned()
     } else {
         format!("{value:.4e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_cells_are_readable() {
+        for (value, text) in [
+            (13.086480435634256, "13.086"),
+            (0.0038, "0.0038"),
+            (221.0, "221"),
+            (-0.0, "0"),
+            (1e10, "1.0000e10"),
+            (2.61125678e10 + 0.5, "2.6113e10"),
+            (-4.21e-5, "-4.2100e-5"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+        assert_eq!(cut("short"), "short");
+        assert_eq!(cut(&"long ".repeat(20)).chars().count(), LONGEST_CELL);
     }
 }

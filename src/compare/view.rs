@@ -1,6 +1,6 @@
 //! What one looks at: plots with the runs' curves in one frame, and the recording side by side.
 
-use super::{Comparison, Found, Member, fields, report, table};
+use super::{Comparison, Found, Member, fields, later, report, table};
 use crate::frame::RunInfo;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_plot};
 use crate::record::rerun_log::{Difference, Finished, Lane, RecordError, SideBySide, Sink};
@@ -124,6 +124,11 @@ pub fn record(
                     ..Default::default()
                 },
                 frames: pair.frames,
+                ends: pair
+                    .runs
+                    .iter()
+                    .any(|&k| later(members[k].end, comparison.time))
+                    .then_some(comparison.time),
             }
         })
         .collect();

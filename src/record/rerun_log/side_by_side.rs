@@ -8,6 +8,9 @@ use super::{Finished, Paths, RecordError, Recorded, RerunLog, SIM_TIME, blueprin
 use crate::frame::{GridField, Rect, RunInfo};
 use crate::record::color::OKABE_ITO;
 
+/// The next instant: what is there at an end stays visible at the end.
+const AFTER: f64 = 1e-9;
+
 /// Where differences live.
 const DIFFERENCES: &str = "differences";
 
@@ -25,6 +28,8 @@ pub struct Difference {
     pub info: RunInfo,
     /// Fields by time (s).
     pub frames: Vec<(f64, Vec<GridField>)>,
+    /// From where on there is none, if a run goes on after the other's end (s).
+    pub ends: Option<f64>,
 }
 
 /// Texts and identity of a comparison.
@@ -84,6 +89,14 @@ impl SideBySide<'_> {
                 rec.reset_time();
                 rec.set_duration_secs(SIM_TIME, *time);
                 fields.iter().try_for_each(|field| log.field(field))?;
+            }
+            if let Some(end) = difference.ends {
+                rec.reset_time();
+                rec.set_duration_secs(SIM_TIME, end + AFTER);
+                for field in &difference.info.fields {
+                    let image = log.paths.field(&field.name).join(&"image".into());
+                    rec.log(image, &archetypes::Clear::flat())?;
+                }
             }
         }
         let pictures = lanes.len() as u64;
