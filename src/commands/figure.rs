@@ -147,7 +147,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     print(&format!("{said}in {}", duration(clock.elapsed().as_secs_f64())))
 }
 
-/// Plans of all runs, and their folders; nothing is computed before all of them are known to do.
+/// Plans and folders of all runs: what is wrong with one is told before anything is computed.
 fn jobs(figure: &Figure, args: &Args, out: &Path) -> Result<Vec<Job>, Failure> {
     let source = presets::find(figure.preset)?;
     let quick: &[&str] = if args.quick { figure.quick } else { &[] };

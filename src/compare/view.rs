@@ -1,6 +1,6 @@
 //! What one looks at: plots with the runs' curves in one frame, and the recording side by side.
 
-use super::{Comparison, Found, Member, fields, later, report, table};
+use super::{Comparison, Found, Kind, Member, fields, later, report, table};
 use crate::frame::RunInfo;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_plot};
 use crate::record::rerun_log::{Difference, Finished, Lane, RecordError, SideBySide, Sink};
@@ -105,10 +105,14 @@ pub fn record(
         .filter_map(|m| Some(Lane { info: m.info.clone()?, recorded: m.recorded.as_ref()? }))
         .collect();
     if lanes.len() < 2 {
-        comparison.notes.push(
-            "fewer than two of the runs have a recording: there is nothing to show side by side"
-                .into(),
-        );
+        // Whoever compares with a summary alone does not expect pictures.
+        if members.iter().all(|m| m.kind != Kind::Summary) {
+            comparison.notes.push(
+                "fewer than two of the runs have a recording: there is nothing to show side by \
+                 side"
+                    .into(),
+            );
+        }
         return Ok((comparison, None));
     }
     let pairs: Vec<Difference> = differences
