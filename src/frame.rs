@@ -76,6 +76,68 @@ pub struct GridField {
     pub range: [f32; 2],
 }
 
+impl GridField {
+    /// The rectangle that the cells fill.
+    pub fn rect(&self) -> Rect {
+        let [x, y] = self.origin;
+        let [dx, dy] = self.cell;
+        Rect { min: [x, y], max: [x + dx * self.nx as f32, y + dy * self.ny as f32] }
+    }
+
+    /// The value at a point by bilinear interpolation between centres of cells; NaN outside, and
+    /// where most of what is around has no value.
+    pub fn at(&self, point: [f32; 2]) -> f32 {
+        let rect = self.rect();
+        let outside = |c: usize| {
+            let room = 1e-3 * self.cell[c];
+            point[c] < rect.min[c] - room || point[c] > rect.max[c] + room
+        };
+        if self.nx * self.ny == 0 || outside(0) || outside(1) {
+            return f32::NAN;
+        }
+        let place = |c: usize, n: usize| {
+            let t = ((point[c] - self.origin[c]) / self.cell[c] - 0.5).clamp(0.0, (n - 1) as f32);
+            let i = (t as usize).min(n.saturating_sub(2));
+            (i, t - i as f32)
+        };
+        let ((i, s), (j, t)) = (place(0, self.nx), place(1, self.ny));
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (di, dj, weight) in [
+            (0, 0, (1.0 - s) * (1.0 - t)),
+            (1, 0, s * (1.0 - t)),
+            (0, 1, (1.0 - s) * t),
+            (1, 1, s * t),
+        ] {
+            let (i, j) = ((i + di).min(self.nx - 1), (j + dj).min(self.ny - 1));
+            let value = self.values[j * self.nx + i];
+            if value.is_finite() {
+                sum += weight * value;
+                total += weight;
+            }
+        }
+        if total >= 0.5 { sum / total } else { f32::NAN }
+    }
+
+    /// The field on another grid, which fills `rect` with `nx` times `ny` cells.
+    pub fn on(&self, rect: Rect, nx: usize, ny: usize) -> GridField {
+        let size = rect.size();
+        let cell = [size[0] / nx.max(1) as f32, size[1] / ny.max(1) as f32];
+        let centre = |k: usize| {
+            let (i, j) = (k % nx, k / nx);
+            [rect.min[0] + (i as f32 + 0.5) * cell[0], rect.min[1] + (j as f32 + 0.5) * cell[1]]
+        };
+        GridField {
+            name: self.name.clone(),
+            origin: rect.min,
+            cell,
+            nx,
+            ny,
+            values: (0..nx * ny).map(|k| self.at(centre(k))).collect(),
+            range: self.range,
+        }
+    }
+}
+
 /// Vectors at points, drawn upon a field.
 #[derive(Debug, Clone)]
 pub struct Arrows {
@@ -158,6 +220,20 @@ impl Rect {
     pub fn size(&self) -> [f32; 2] {
         [self.max[0] - self.min[0], self.max[1] - self.min[1]]
     }
+
+    /// The smallest rectangle around both.
+    pub fn around(self, other: Rect) -> Rect {
+        let pick = |c: usize| (self.min[c].min(other.min[c]), self.max[c].max(other.max[c]));
+        let ((x0, x1), (y0, y1)) = (pick(0), pick(1));
+        Rect { min: [x0, y0], max: [x1, y1] }
+    }
+
+    /// What both cover; `None` if they share no area.
+    pub fn common(self, other: Rect) -> Option<Rect> {
+        let pick = |c: usize| (self.min[c].max(other.min[c]), self.max[c].min(other.max[c]));
+        let ((x0, x1), (y0, y1)) = (pick(0), pick(1));
+        (x0 < x1 && y0 < y1).then_some(Rect { min: [x0, y0], max: [x1, y1] })
+    }
 }
 
 /// A named polyline.
@@ -226,5 +302,45 @@ impl Series {
     /// A curve of the numbers at `path`.
     pub fn new(path: impl Into<String>, name: impl Into<String>) -> Self {
         Self { path: path.into(), name: name.into() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plane(nx: usize, ny: usize) -> GridField {
+        let cell = [2.0 / nx as f32, 1.0 / ny as f32];
+        let value = |k: usize| {
+            let (i, j) = (k % nx, k / nx);
+            3.0 * (i as f32 + 0.5) * cell[0] - (j as f32 + 0.5) * cell[1]
+        };
+        GridField {
+            name: "plane".into(),
+            origin: [0.0, 0.0],
+            cell,
+            nx,
+            ny,
+            values: (0..nx * ny).map(value).collect(),
+            range: [0.0, 1.0],
+        }
+    }
+
+    #[test]
+    fn a_plane_is_the_same_on_other_grids() {
+        let fine = plane(40, 30);
+        let coarse = fine.on(fine.rect(), 7, 5);
+        for (a, b) in coarse.values.iter().zip(&plane(7, 5).values) {
+            assert!((a - b).abs() < 1e-5, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_value_stays_without() {
+        let mut field = plane(4, 4);
+        field.values[0] = f32::NAN;
+        assert!(field.at([0.25, 0.125]).is_nan());
+        assert!(field.at([0.9, 0.3]).is_finite());
+        assert!(field.at([-0.1, 0.3]).is_nan());
     }
 }

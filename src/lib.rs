@@ -8,8 +8,8 @@
 //!   in SI units.
 //! - [`space`], [`solve`], [`motion`] are what a step is made of; [`laws`] are the equations of the
 //!   source, as functions of small matrices.
-//! - [`record`] writes recordings, tables and plots; [`cases`] are scenes with exact solutions,
-//!   [`verify`] measures them, and [`cost`] says what accuracy costs.
+//! - [`record`] writes recordings, tables and plots, and [`compare`] reads them back; [`cases`] are
+//!   scenes with exact solutions, [`verify`] measures them, and [`cost`] says what accuracy costs.
 //!
 //! ```
 //! use grainscope::{plan, scene, sim};
@@ -34,6 +34,7 @@
 
 pub mod cases;
 pub mod commands;
+pub mod compare;
 pub mod cost;
 pub mod frame;
 pub mod laws;

@@ -1,8 +1,10 @@
 //! The command line: the top floor, which nothing imports.
 
 mod check;
+mod compare;
 mod cost;
 mod cost_page;
+mod figure;
 mod plan;
 mod presets;
 mod purchase;
@@ -48,6 +50,7 @@ Examples:
   grainscope run silo                                   discharge of a silo, recorded
   grainscope run presets/silo.toml --set alpha=5/3 --out runs/stiff
   grainscope run shear_alignment --save align.rrd --serve   save and watch at once
+  grainscope compare runs/silo runs/stiff               side by side, and how they differ
   grainscope plan silo                                  which effects are solved, and why
   grainscope presets show silo                          the scene as TOML";
 
@@ -78,6 +81,10 @@ enum Command {
     Stress(stress::Args),
     /// Measure what accuracy costs: a price list of settings
     Cost(cost::Args),
+    /// Compare runs: values, curves, fields, scenes, and one recording side by side
+    Compare(compare::Args),
+    /// Make a figure of the source: runs, plots, snapshots, a recording side by side
+    Figure(figure::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -176,6 +183,8 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Stress(args) => stress::run(&args),
         Command::Cost(args) => cost::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Figure(args) => figure::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

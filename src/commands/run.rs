@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use crate::plan::Plan;
 use crate::record::logger::{Backpressure, Logger, Traffic};
 use crate::record::plots::{Axis, Curve, PlotSpec, line_plot, panels_plot};
-use crate::record::rerun_log::{RerunLog, Sink};
+use crate::record::rerun_log::{RerunLog, Served, Sink};
 use crate::record::series::SeriesWriter;
 use crate::record::summary::{Ending, Summary, Tally};
 use crate::record::text::duration;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-#[derive(clap::Args)]
+#[derive(clap::Args, Default)]
 pub struct Args {
     /// Preset name or path of a TOML file
     scene: String,
@@ -70,6 +70,9 @@ pub struct Args {
     /// Print seconds per phase at the end
     #[arg(long)]
     profile: bool,
+    /// Several runs at once are quiet: what they say would mix.
+    #[arg(skip)]
+    quiet: bool,
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
@@ -94,6 +97,24 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut session = Session::open(args, &plan, run, folder, clock, interrupted)?;
     session.bought = bought;
     session.go()
+}
+
+/// Runs a plan into a folder as `run` does, without a word on the terminal; `watch` sees every step,
+/// and the start.
+pub(super) fn into_folder(
+    plan: &Arc<Plan>,
+    folder: PathBuf,
+    interrupted: &Arc<AtomicBool>,
+    watch: impl FnMut(&dyn Run),
+) -> Result<Summary, Failure> {
+    let clock = Instant::now();
+    let run = sim::start(plan.clone())?;
+    let args = Args { quiet: true, ..Args::default() };
+    let mut session = Session::open(&args, plan, run, folder, clock, interrupted.clone())?;
+    let outcome = session.compute(watch);
+    let ended = session.end(outcome)?;
+    ended.plotted?;
+    ended.failure.map_or(Ok(ended.summary), Err)
 }
 
 /// The scene with an earlier end; frames keep their interval.
@@ -124,7 +145,7 @@ fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
 }
 
 /// The first interrupt ends the run after its step; a second one ends the program.
-fn watch_interrupts(flag: &Arc<AtomicBool>) {
+pub(super) fn watch_interrupts(flag: &Arc<AtomicBool>) {
     let flag = flag.clone();
     let watching = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::SeqCst) {
@@ -152,7 +173,20 @@ struct Session {
     steps: Option<u64>,
     json: bool,
     profile: bool,
+    quiet: bool,
     bought: Option<Bought>,
+}
+
+/// What is left when all files are closed.
+struct Ended {
+    summary: Summary,
+    /// The summary, as written.
+    json: String,
+    /// The recording and its size.
+    recorded: Option<(PathBuf, u64)>,
+    served: Option<Served>,
+    failure: Option<Failure>,
+    plotted: Result<(), Failure>,
 }
 
 impl Session {
@@ -182,7 +216,7 @@ impl Session {
         if every > 1 && !sinks.is_empty() {
             warnings.push(crate::plan::Warning::ParticlesThinned { every }.to_string());
         }
-        for w in &warnings {
+        for w in warnings.iter().filter(|_| !args.quiet) {
             eprintln!("warning: {w}");
         }
         let logger = if sinks.is_empty() {
@@ -229,6 +263,7 @@ impl Session {
             steps: args.steps,
             json: args.json,
             profile: args.profile,
+            quiet: args.quiet,
             bought: None,
         })
     }
@@ -240,9 +275,9 @@ impl Session {
         let thread = std::thread::Builder::new()
             .name("simulation".into())
             .spawn(move || {
-                let outcome = self.compute(|step, time| {
+                let outcome = self.compute(|run| {
                     // The display may miss steps; it never holds the simulation up.
-                    let _ = sender.try_send((step, time));
+                    let _ = sender.try_send((run.row().step, run.row().time));
                 });
                 (self, outcome)
             })
@@ -267,8 +302,8 @@ impl Session {
         }
     }
 
-    fn compute(&mut self, progress: impl FnMut(u64, f64)) -> Result<Ending, Failure> {
-        let outcome = self.steps(progress);
+    fn compute(&mut self, watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
+        let outcome = self.steps(watch);
         // A run that ends between two frames still shows where it ended.
         if let (Ok(Ending::StepLimit | Ending::Interrupted | Ending::BudgetSpent), Some(logger)) =
             (&outcome, &mut self.logger)
@@ -282,8 +317,9 @@ impl Session {
         outcome
     }
 
-    fn steps(&mut self, mut progress: impl FnMut(u64, f64)) -> Result<Ending, Failure> {
+    fn steps(&mut self, mut watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
         self.observe(vec![])?;
+        watch(self.run.as_ref());
         while !self.run.is_finished() {
             if self.interrupted.load(Ordering::SeqCst) {
                 return Ok(Ending::Interrupted);
@@ -297,7 +333,7 @@ impl Session {
             self.run.step()?;
             let events = self.run.events().to_vec();
             self.observe(events)?;
-            progress(self.run.row().step, self.run.row().time);
+            watch(self.run.as_ref());
         }
         Ok(Ending::Finished)
     }
@@ -335,8 +371,25 @@ impl Session {
         Ok(())
     }
 
-    /// Closes the recording, writes plots and summary, and says what there is.
+    /// Closes all files and says what there is.
     fn close(mut self, outcome: Result<Ending, Failure>) -> Result<(), Failure> {
+        let ended = self.end(outcome)?;
+        if self.json {
+            print(&ended.json)?;
+        } else {
+            print(&self.report(&ended.summary, ended.recorded))?;
+        }
+        if let (Some(served), None) = (&ended.served, &ended.failure) {
+            eprintln!("still serving {} (Ctrl-C ends)", served.url());
+            while !self.interrupted.load(Ordering::SeqCst) {
+                std::thread::sleep(std::time::Duration::from_millis(100));
+            }
+        }
+        ended.failure.map_or(ended.plotted, Err)
+    }
+
+    /// Closes the recording, writes plots and summary.
+    fn end(&mut self, outcome: Result<Ending, Failure>) -> Result<Ended, Failure> {
         let mut served = None;
         let mut recorded = None;
         let mut fault = None;
@@ -346,7 +399,7 @@ impl Session {
             self.tally.logger_seconds = busy.as_secs_f64();
             match result {
                 Ok(done) => {
-                    for notice in &done.notices {
+                    for notice in done.notices.iter().filter(|_| !self.quiet) {
                         eprintln!("warning: {notice}");
                     }
                     self.tally.warnings.extend(done.notices);
@@ -359,7 +412,9 @@ impl Session {
         }
         self.tally.wall = self.clock.elapsed().as_secs_f64();
         for w in self.run.warnings() {
-            eprintln!("warning: {w}");
+            if !self.quiet {
+                eprintln!("warning: {w}");
+            }
             self.tally.warnings.push(w.to_string());
         }
         let ending = match &outcome {
@@ -388,18 +443,7 @@ impl Session {
         std::fs::write(&path, format!("{json}\n"))
             .map_err(|e| Failure::Environment(format!("cannot write {}: {e}", path.display())))?;
         let plotted = self.plot();
-        if self.json {
-            print(&json)?;
-        } else {
-            print(&self.report(&summary, recorded))?;
-        }
-        if let (Some(served), None) = (&served, &failure) {
-            eprintln!("still serving {} (Ctrl-C ends)", served.url());
-            while !self.interrupted.load(Ordering::SeqCst) {
-                std::thread::sleep(std::time::Duration::from_millis(100));
-            }
-        }
-        failure.map_or(plotted, Err)
+        Ok(Ended { summary, json, recorded, served, failure, plotted })
     }
 
     fn plot(&self) -> Result<(), Failure> {

@@ -174,12 +174,17 @@ pub fn frame(
         Scalar::new("diagnostics/power_error", row.power_error),
         Scalar::new("diagnostics/divergence_error", row.divergence_error),
         Scalar::new("diagnostics/volume_error", row.volume_error),
+        Scalar::new("diagnostics/max_speed", row.max_speed),
+        Scalar::new("diagnostics/rms_speed", row.rms_speed),
     ];
     for (g, plan) in row.gauges.iter().zip(&plan.gauges) {
         scalars.push(Scalar::new(format!("gauges/{}/volume", plan.name), g.volume));
         scalars.push(Scalar::new(format!("gauges/{}/rate", plan.name), g.rate));
     }
     scalars.extend(row.seconds.list().map(|(name, s)| Scalar::new(format!("seconds/{name}"), s)));
+    for (drift, material) in row.drift.iter().zip(&plan.state.materials) {
+        scalars.push(Scalar::new(format!("volume_drift/{}", material.name), *drift));
+    }
     scalars.extend(row.alignment.map(|a| Scalar::new("texture/alignment", a)));
     if row.step > 0 {
         scalars.push(Scalar::new("time/dt", row.dt));

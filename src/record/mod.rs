@@ -8,5 +8,6 @@ pub mod number;
 pub mod plots;
 pub mod rerun_log;
 pub mod series;
+pub mod sheet;
 pub mod summary;
 pub mod text;

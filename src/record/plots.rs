@@ -32,8 +32,8 @@ const SVG_GRAIN: u32 = 8;
 /// Curves with more points than this are thinned to their extremes per pixel.
 const MOST_POINTS: usize = 5000;
 
-const FONT: &str = "sans-serif";
-const INK: RGBColor = RGBColor(34, 34, 38);
+pub(super) const FONT: &str = "sans-serif";
+pub(super) const INK: RGBColor = RGBColor(34, 34, 38);
 const GRID: RGBColor = RGBColor(225, 225, 228);
 
 /// One axis.
@@ -95,19 +95,20 @@ pub struct PlotError {
 
 /// Writes `<stem>.svg` and `<stem>.png`.
 pub fn line_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
-    write(stem, std::slice::from_ref(plot), SIZE)
+    write(stem, &Panels(std::slice::from_ref(plot)), SIZE)
 }
 
 /// Writes `<stem>.svg` only.
 pub fn svg_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
     let path = with_suffix(stem, ".svg");
-    to_svg(&path, std::slice::from_ref(plot), SIZE).map_err(|cause| PlotError { path, cause })
+    let panels = Panels(std::slice::from_ref(plot));
+    to_svg(&path, &panels, SIZE).map_err(|cause| PlotError { path, cause })
 }
 
 /// Writes several plots, one below the other, to `<stem>.svg` and `<stem>.png`.
 pub fn panels_plot(stem: &Path, plots: &[PlotSpec]) -> Result<(), PlotError> {
     let count = u32::try_from(plots.len()).unwrap_or(1).max(1);
-    write(stem, plots, (SIZE.0, PANEL_HEIGHT * count))
+    write(stem, &Panels(plots), (SIZE.0, PANEL_HEIGHT * count))
 }
 
 /// Not `with_extension`: a stem such as `dt_0.01` has none to replace.
@@ -117,20 +118,26 @@ fn with_suffix(stem: &Path, suffix: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-fn write(stem: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), PlotError> {
-    let (svg, png) = (with_suffix(stem, ".svg"), with_suffix(stem, ".png"));
-    to_svg(&svg, plots, size).map_err(|cause| PlotError { path: svg, cause })?;
-    to_png(&png, plots, size).map_err(|cause| PlotError { path: png, cause })
+/// A figure that any backend can draw.
+pub(super) trait Drawing {
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, pen: Pen) -> Drawn<B>;
 }
 
-fn to_svg(path: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), String> {
+/// Writes a figure of a size in pixels as `<stem>.svg` and `<stem>.png`.
+pub(super) fn write(stem: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), PlotError> {
+    let (svg, png) = (with_suffix(stem, ".svg"), with_suffix(stem, ".png"));
+    to_svg(&svg, figure, size).map_err(|cause| PlotError { path: svg, cause })?;
+    to_png(&png, figure, size).map_err(|cause| PlotError { path: png, cause })
+}
+
+fn to_svg(path: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), String> {
     font()?;
     let (width, height) = (size.0 * SVG_GRAIN, size.1 * SVG_GRAIN);
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
         let pen = Pen { scale: f64::from(SVG_GRAIN), joins: true };
-        figure(&root, plots, pen).map_err(|e| e.to_string())?;
+        figure.draw(&root, pen).map_err(|e| e.to_string())?;
         root.present().map_err(|e| e.to_string())?;
     }
     // The view box, which follows, keeps the large size.
@@ -142,14 +149,14 @@ fn to_svg(path: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), Strin
     std::fs::write(path, text).map_err(|e| e.to_string())
 }
 
-fn to_png(path: &Path, plots: &[PlotSpec], size: (u32, u32)) -> Result<(), String> {
+fn to_png(path: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), String> {
     font()?;
     let large = (size.0 * OVERSAMPLING, size.1 * OVERSAMPLING);
     let mut pixels = vec![0; 3 * large.0 as usize * large.1 as usize];
     {
         let root = BitMapBackend::with_buffer(&mut pixels, large).into_drawing_area();
         let pen = Pen { scale: f64::from(OVERSAMPLING), joins: false };
-        figure(&root, plots, pen).map_err(|e| e.to_string())?;
+        figure.draw(&root, pen).map_err(|e| e.to_string())?;
         root.present().map_err(|e| e.to_string())?;
     }
     let small = average(&pixels, size);
@@ -196,26 +203,68 @@ fn font() -> Result<(), String> {
 
 /// How a backend draws.
 #[derive(Clone, Copy)]
-struct Pen {
+pub(super) struct Pen {
     /// Pixels of the backend per pixel of the figure.
-    scale: f64,
+    pub(super) scale: f64,
     /// Whether it joins thick lines well. Plotters' bitmaps do not: at sharp
     /// turns their joints shoot out of the figure.
     joins: bool,
 }
 
-type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
-fn figure<B: DrawingBackend>(
-    root: &DrawingArea<B, Shift>,
-    plots: &[PlotSpec],
-    pen: Pen,
-) -> Drawn<B> {
-    root.fill(&WHITE)?;
-    for (area, plot) in root.split_evenly((plots.len().max(1), 1)).iter().zip(plots) {
-        Panel::new(area, plot, pen).draw()?;
+impl Pen {
+    pub(super) fn px(self, n: f64) -> i32 {
+        (n * self.scale).round() as i32
     }
-    Ok(())
+
+    pub(super) fn stroke(self, color: RGBColor, width: f64) -> ShapeStyle {
+        color.stroke_width(self.px(width).max(1) as u32)
+    }
+
+    pub(super) fn text<B: DrawingBackend>(
+        self,
+        area: &DrawingArea<B, Shift>,
+        text: &str,
+        size: f64,
+        at: (i32, i32),
+        pos: Pos,
+    ) -> Drawn<B> {
+        let style = (FONT, size * self.scale).into_text_style(area);
+        area.draw_text(text, &style.color(&INK).pos(pos), at)
+    }
+
+    /// A line through points.
+    pub(super) fn polyline<B: DrawingBackend>(
+        self,
+        area: &DrawingArea<B, Shift>,
+        points: Vec<(i32, i32)>,
+        style: ShapeStyle,
+    ) -> Drawn<B> {
+        if points.len() < 2 {
+            return Ok(());
+        }
+        if self.joins {
+            return area.draw(&PathElement::new(points, style));
+        }
+        for ends in points.windows(2) {
+            area.draw(&PathElement::new([ends[0], ends[1]], style))?;
+        }
+        Ok(())
+    }
+}
+
+/// Plots, one below the other.
+struct Panels<'a>(&'a [PlotSpec]);
+
+impl Drawing for Panels<'_> {
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, pen: Pen) -> Drawn<B> {
+        root.fill(&WHITE)?;
+        for (area, plot) in root.split_evenly((self.0.len().max(1), 1)).iter().zip(self.0) {
+            Panel::new(area, plot, pen).draw()?;
+        }
+        Ok(())
+    }
 }
 
 /// An axis laid out for some data.
@@ -380,33 +429,72 @@ struct Panel<'a, B: DrawingBackend> {
     pen: Pen,
     /// Left, top, right, bottom of the frame (pixels of the backend).
     frame: [i32; 4],
+    /// Rows of the legend: each curve and the width of its name.
+    legend: Vec<Vec<(usize, i32)>>,
 }
+
+/// Height of a row of the legend (pixels).
+const LEGEND_ROW: f64 = 30.0;
 
 impl<'a, B: DrawingBackend> Panel<'a, B> {
     fn new(area: &'a DrawingArea<B, Shift>, plot: &'a PlotSpec, pen: Pen) -> Self {
         let (width, height) = area.dim_in_pixel();
-        let px = |n: f64| (n * pen.scale).round() as i32;
-        let top = if plot.curves.len() > 1 { 88.0 } else { 56.0 };
+        let (left, right) =
+            (pen.px(105.0), i32::try_from(width).unwrap_or(i32::MAX) - pen.px(35.0));
+        let legend = Self::legend_rows(area, plot, pen, right - left);
         let frame = [
-            px(105.0),
-            px(top),
-            i32::try_from(width).unwrap_or(i32::MAX) - px(35.0),
-            i32::try_from(height).unwrap_or(i32::MAX) - px(68.0),
+            left,
+            pen.px(58.0 + LEGEND_ROW * legend.len() as f64),
+            right,
+            i32::try_from(height).unwrap_or(i32::MAX) - pen.px(68.0),
         ];
-        Self { area, plot, pen, frame }
+        Self { area, plot, pen, frame, legend }
+    }
+
+    /// Names of several curves, in as many rows as they need. One curve needs none.
+    fn legend_rows(
+        area: &DrawingArea<B, Shift>,
+        plot: &PlotSpec,
+        pen: Pen,
+        room: i32,
+    ) -> Vec<Vec<(usize, i32)>> {
+        let mut rows: Vec<Vec<(usize, i32)>> = vec![];
+        if plot.curves.len() < 2 {
+            return rows;
+        }
+        let style = (FONT, 18.0 * pen.scale).into_text_style(area);
+        let mut full = 0;
+        for (k, curve) in plot.curves.iter().enumerate() {
+            let size = area.estimate_text_size(&curve.name, &style);
+            let name = size.map_or(0, |(width, _)| i32::try_from(width).unwrap_or(0));
+            let width = name + Self::swatch(pen);
+            match rows.last_mut() {
+                Some(row) if full + width <= room => row.push((k, name)),
+                _ => {
+                    full = 0;
+                    rows.push(vec![(k, name)]);
+                }
+            }
+            full += width;
+        }
+        rows
+    }
+
+    /// Room of a name in the legend besides the name: its line, and gaps.
+    fn swatch(pen: Pen) -> i32 {
+        pen.px(28.0) + pen.px(8.0) + pen.px(26.0)
     }
 
     fn px(&self, n: f64) -> i32 {
-        (n * self.pen.scale).round() as i32
+        self.pen.px(n)
     }
 
     fn line(&self, color: RGBColor, width: f64) -> ShapeStyle {
-        color.stroke_width(self.px(width).max(1) as u32)
+        self.pen.stroke(color, width)
     }
 
     fn text(&self, text: &str, size: f64, at: (i32, i32), pos: Pos) -> Drawn<B> {
-        let style = (FONT, size * self.pen.scale).into_text_style(self.area);
-        self.area.draw_text(text, &style.color(&INK).pos(pos), at)
+        self.pen.text(self.area, text, size, at, pos)
     }
 
     fn draw(&self) -> Drawn<B> {
@@ -478,35 +566,22 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         self.area.draw_text(&y.label, &style, beside)
     }
 
-    /// Names of the curves, in a row above the frame.
+    /// Names of the curves, in rows above the frame.
     fn legend(&self) -> Drawn<B> {
-        if self.plot.curves.len() < 2 {
-            return Ok(());
-        }
         let [left, _, right, _] = self.frame;
-        let style = (FONT, 18.0 * self.pen.scale).into_text_style(self.area);
-        let widths = self.plot.curves.iter().map(|curve| {
-            let size = self.area.estimate_text_size(&curve.name, &style);
-            size.map_or(0, |(width, _)| i32::try_from(width).unwrap_or(0))
-        });
-        let widths: Vec<i32> = widths.collect();
-        let (swatch, gap, space) = (self.px(28.0), self.px(8.0), self.px(26.0));
-        let full: i32 = widths.iter().map(|width| width + swatch + gap + space).sum();
-        let mut at = ((left + right - full + space) / 2).max(left);
-        let y = self.px(64.0);
-        let curves = self.plot.curves.iter().zip(&widths);
-        for ((curve, width), [r, g, b]) in curves.zip(OKABE_ITO.iter().cycle()) {
-            if at + swatch + gap + width > right + self.px(20.0) {
-                // What does not fit is left to the caption.
+        let (line, gap, space) = (self.px(28.0), self.px(8.0), self.px(26.0));
+        for (row, y) in self.legend.iter().zip(0..) {
+            let y = self.px(64.0 + LEGEND_ROW * f64::from(y));
+            let full: i32 = row.iter().map(|(_, width)| width + Self::swatch(self.pen)).sum();
+            let mut at = ((left + right - full + space) / 2).max(left);
+            for &(k, width) in row {
+                let [r, g, b] = OKABE_ITO[k % OKABE_ITO.len()];
+                let style = self.line(RGBColor(r, g, b), 3.0);
+                self.area.draw(&PathElement::new([(at, y), (at + line, y)], style))?;
                 let pos = Pos::new(HPos::Left, VPos::Center);
-                return self.text("…", 18.0, (at, y), pos);
+                self.text(&self.plot.curves[k].name, 18.0, (at + line + gap, y), pos)?;
+                at += width + Self::swatch(self.pen);
             }
-            let line = [(at, y), (at + swatch, y)];
-            let style = self.line(RGBColor(*r, *g, *b), 3.0);
-            self.area.draw(&PathElement::new(line, style))?;
-            let pos = Pos::new(HPos::Left, VPos::Center);
-            self.text(&curve.name, 18.0, (at + swatch + gap, y), pos)?;
-            at += swatch + gap + width + space;
         }
         Ok(())
     }
@@ -529,15 +604,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
                     self.area.draw(&Circle::new(at, self.px(4.5), color.filled()))?;
                 }
             }
-            let style = self.line(color, 2.0);
-            if !self.pen.joins {
-                for ends in piece.windows(2) {
-                    let ends = [ends[0], ends[1]];
-                    self.area.draw(&PathElement::new(ends, style))?;
-                }
-            } else if piece.len() > 1 {
-                self.area.draw(&PathElement::new(piece, style))?;
-            }
+            self.pen.polyline(self.area, piece, self.line(color, 2.0))?;
         }
         Ok(())
     }

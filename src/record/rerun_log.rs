@@ -7,6 +7,7 @@
 //! | `world/particles`, `world/dye`, `world/directors` | the flow |
 //! | `world/walls`, `world/gauges` | what does not move |
 //! | `world/fields/<field>/{image,bar,ticks,isolines}` | one field |
+//! | `world/fields/<field>/values` | its numbers, on half as many samples a side |
 //! | the path of each scalar, and `<path>/log10` | the plots |
 //! | `scene`, `plan`, `log` | what was asked, what is solved, what went wrong |
 //!
@@ -17,6 +18,8 @@
 mod bar;
 mod blueprint;
 mod race;
+mod read;
+mod side_by_side;
 mod sinks;
 
 use std::collections::{HashMap, HashSet};
@@ -28,6 +31,8 @@ use rerun::components::{Color, MagnificationFilter, Radius};
 use rerun::{EntityPath, EntityPathPart, RecordingStream};
 
 pub use race::Race;
+pub use read::{ReadError, Recorded, Sample};
+pub use side_by_side::{Difference, Lane, SideBySide};
 pub use sinks::{Saved, Sink};
 
 use crate::frame::{
@@ -39,6 +44,9 @@ use sinks::{Destinations, Live, Page, RrdFile};
 
 /// The application all recordings belong to.
 const APPLICATION: &str = "grainscope";
+
+/// Where entities of runs live.
+const RUNS: &str = "runs";
 
 const SIM_TIME: &str = "sim_time";
 const STEP: &str = "step";
@@ -123,12 +131,12 @@ struct Paths {
 
 impl Paths {
     fn new(name: &str) -> Self {
-        Self {
-            root: EntityPath::new(vec![
-                EntityPathPart::new("runs"),
-                EntityPathPart::new(name.to_owned()),
-            ]),
-        }
+        Self::below(RUNS, name)
+    }
+
+    fn below(folder: &str, name: &str) -> Self {
+        let parts = [folder, name].map(|part| EntityPathPart::new(part.to_owned()));
+        Self { root: EntityPath::new(parts.to_vec()) }
     }
 
     /// The entity at a path of the run, parts separated by slashes.
@@ -202,20 +210,7 @@ impl RerunLog {
     /// Starts a recording: destinations, layout and all that does not change.
     pub fn open(info: &RunInfo, sinks: &[Sink]) -> Result<Self, RecordError> {
         let to = Destinations::open(sinks)?;
-        let mut builder = rerun::RecordingStreamBuilder::new(APPLICATION)
-            .recording_id(info.recording_id.as_str())
-            // The RERUN environment variable must not silence a recording that was asked for.
-            .enabled(true);
-        if to.viewers.is_empty() {
-            builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
-                flush_tick: FILE_TICK,
-                ..Default::default()
-            });
-        }
-        let rec = builder.set_sinks(to.sinks)?;
-        rec.set_log_time_enabled(false);
-        rec.set_log_tick_enabled(false);
-
+        let rec = stream(&info.recording_id, to.sinks, !to.viewers.is_empty())?;
         blueprint::send(&rec, info, &Paths::new(&info.name))?;
         rec.send_recording_name(info.name.as_str())?;
         let mut log = Self::of(rec, info);
@@ -451,6 +446,27 @@ impl RerunLog {
         Ok(())
     }
 
+    /// Curves of several runs share plots: there a colour tells the run, and a name if given.
+    fn one_color(
+        &self,
+        info: &RunInfo,
+        name: Option<&str>,
+        color: [u8; 3],
+    ) -> Result<(), RecordError> {
+        let mut style = archetypes::SeriesLines::update_fields()
+            .with_colors([rgb(on_dark(color))])
+            .with_widths([1.75]);
+        if let Some(name) = name {
+            style = style.with_names([name]);
+        }
+        for plot in &info.plots {
+            for series in &plot.series {
+                self.rec.log_static(self.paths.curve(&series.path, plot.log10), &style)?;
+            }
+        }
+        Ok(())
+    }
+
     fn scalar(&self, scalar: &Scalar) -> Result<(), RecordError> {
         self.rec.log(self.paths.at(&scalar.path), &archetypes::Scalars::single(scalar.value))?;
         if self.logarithms.contains(&scalar.path) {
@@ -483,6 +499,7 @@ impl RerunLog {
         )?;
         for field in &picture.fields {
             self.field(field)?;
+            self.values(field)?;
         }
         if let Some(arrows) = &picture.arrows {
             expect_length("arrows", arrows.vectors.len(), arrows.origins.len())?;
@@ -547,6 +564,19 @@ impl RerunLog {
             ],
         )?;
         self.scale_bar(&path, scale)
+    }
+
+    /// The numbers of a field, which its colours do not tell exactly. No view draws them.
+    fn values(&self, field: &GridField) -> Result<(), RecordError> {
+        let coarse = field.on(field.rect(), field.nx.div_ceil(2), field.ny.div_ceil(2));
+        let shape = vec![coarse.ny as u64, coarse.nx as u64];
+        let buffer = rerun::datatypes::TensorBuffer::F32(coarse.values.into());
+        let tensor = rerun::datatypes::TensorData::new(shape, buffer).with_dim_names(["y", "x"]);
+        self.rec.log(
+            self.paths.field(&field.name).join(&"values".into()),
+            &archetypes::Tensor::new(tensor),
+        )?;
+        Ok(())
     }
 
     /// A colour bar with numbers, drawn again when its ends change.
@@ -637,6 +667,28 @@ impl RerunLog {
         self.isolines = groups.into_keys().collect();
         Ok(())
     }
+}
+
+/// A recording without any content yet.
+fn stream(
+    id: &str,
+    sinks: Vec<Box<dyn rerun::sink::LogSink>>,
+    live: bool,
+) -> Result<RecordingStream, RecordError> {
+    let mut builder = rerun::RecordingStreamBuilder::new(APPLICATION)
+        .recording_id(id)
+        // The RERUN environment variable must not silence a recording that was asked for.
+        .enabled(true);
+    if !live {
+        builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
+            flush_tick: FILE_TICK,
+            ..Default::default()
+        });
+    }
+    let rec = builder.set_sinks(sinks)?;
+    rec.set_log_time_enabled(false);
+    rec.set_log_tick_enabled(false);
+    Ok(rec)
 }
 
 fn rgb([r, g, b]: [u8; 3]) -> Color {

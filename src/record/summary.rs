@@ -45,6 +45,9 @@ pub struct Summary {
     pub unknowns: Unknowns,
     pub gauges: IndexMap<String, GaugeRow>,
     pub volume_drift: IndexMap<String, f64>,
+    /// Volume mean of |n_x| over layered particles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_alignment: Option<f64>,
     pub balances: Balances,
     pub population: IndexMap<&'static str, u64>,
     pub seconds: IndexMap<&'static str, f64>,
@@ -175,6 +178,7 @@ impl Summary {
                 .map(|m| m.name.clone())
                 .zip(row.drift.iter().copied())
                 .collect(),
+            mean_alignment: row.alignment,
             balances: Balances {
                 power_error: tally.largest_power_error,
                 divergence_error: tally.largest_divergence,

@@ -345,7 +345,10 @@ fn isoline(f: &GridField, level: f32) -> Isoline {
             let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
             let mut cuts: Vec<[f32; 2]> = Vec::with_capacity(4);
             for e in 0..4 {
-                let ((ai, aj), (bi, bj)) = (corners[e], corners[(e + 1) % 4]);
+                // In one order for both cells at the edge: the cut is the same to the last bit, and
+                // segments join.
+                let ends = (corners[e], corners[(e + 1) % 4]);
+                let ((ai, aj), (bi, bj)) = if ends.0 < ends.1 { ends } else { (ends.1, ends.0) };
                 let (a, b) = (value(ai, aj) - level, value(bi, bj) - level);
                 if (a < 0.0) != (b < 0.0) && a.is_finite() && b.is_finite() {
                     let t = a / (a - b);

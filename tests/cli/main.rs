@@ -1,6 +1,7 @@
 //! The program as a user meets it: arguments in; exit code, text and files out.
 
 mod commands;
+mod compare;
 mod cost;
 mod recording;
 mod refusals;

@@ -11,7 +11,7 @@ use rerun::datatypes::{Range1D, Range2D, Uuid};
 use rerun::external::re_log_types::BlueprintActivationCommand;
 use rerun::external::re_sdk_types::blueprint::{archetypes, components};
 
-use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, bar};
+use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, bar, side_by_side};
 use crate::frame::{Plot, Rect, RunInfo};
 use crate::record::color::PAPER;
 
@@ -21,6 +21,19 @@ const WIDE: f32 = 1.3;
 
 /// Plots shown at once; the others share tabs.
 const PLOTS_AT_ONCE: usize = 4;
+
+/// What a view of the flow shows.
+const FLOW: [&str; 2] = ["+ $origin/world/**", "- $origin/world/fields/**"];
+
+/// What a view of a field shows.
+fn field_contents(paths: &Paths, name: &str) -> [String; 4] {
+    [
+        format!("+ {}/**", paths.field(name)),
+        "+ $origin/world".to_owned(),
+        "+ $origin/world/walls".to_owned(),
+        "+ $origin/world/gauges".to_owned(),
+    ]
+}
 
 /// Sends the layout of a run.
 pub(super) fn send(
@@ -35,6 +48,17 @@ pub(super) fn send(
 pub(super) fn send_race(rec: &RecordingStream, infos: &[RunInfo]) -> Result<(), RecordError> {
     let id = infos.first().map_or("race", |info| info.recording_id.as_str());
     lay_out(rec, id, WALL_TIME, |writer| writer.race(infos))
+}
+
+/// Sends the layout of a comparison: runs above, differences, curves and texts below.
+pub(super) fn send_comparison(
+    rec: &RecordingStream,
+    id: &str,
+    infos: &[&RunInfo],
+    differences: &[(&RunInfo, Paths)],
+    texts: &[(&str, rerun::EntityPath)],
+) -> Result<(), RecordError> {
+    lay_out(rec, id, SIM_TIME, |writer| writer.comparison(infos, differences, texts))
 }
 
 fn lay_out(
@@ -141,9 +165,8 @@ impl Writer<'_> {
         let mut contents = vec![];
         for info in infos {
             let paths = Paths::new(&info.name);
-            let flow = ["+ $origin/world/**", "- $origin/world/fields/**"];
             let seen = bar::seen(info.domain, bar::Room::Large);
-            let mut lane = vec![self.space(&info.name, &paths, &flow, seen)?];
+            let mut lane = vec![self.space(&info.name, &paths, &FLOW, seen)?];
             lane.extend(self.fields(info, &paths)?.into_iter().take(1));
             lanes.push(self.stack(components::ContainerKind::Vertical, &lane, &[])?);
             let series = info.plots.iter().take(1).flat_map(|plot| &plot.series);
@@ -154,13 +177,146 @@ impl Writer<'_> {
             return Ok(lanes);
         };
         let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
-        let view = self.view("TimeSeries", &plot.title, "/", &contents)?;
-        self.property(
-            &view,
-            "PlotLegend",
-            &archetypes::PlotLegend::new().with_corner(components::Corner2D::RightBottom),
-        )?;
+        let view = self.curves(&plot.title, "/", &contents, components::Corner2D::RightBottom)?;
         self.stack(components::ContainerKind::Vertical, &[lanes, view], &[3.0, 1.0])
+    }
+
+    fn comparison(
+        &mut self,
+        infos: &[&RunInfo],
+        differences: &[(&RunInfo, Paths)],
+        texts: &[(&str, rerun::EntityPath)],
+    ) -> Result<Node, RecordError> {
+        let domain = side_by_side::bounds(infos);
+        let mut above = vec![self.lanes("Flow", infos, domain, &FLOW)?];
+        let mut names: Vec<&str> = vec![];
+        for field in infos.iter().flat_map(|info| &info.fields) {
+            if !names.contains(&field.name.as_str()) {
+                names.push(&field.name);
+                above.push(self.field_lanes(&field.name, infos, domain)?);
+            }
+        }
+        let above = self.tabs(&above)?;
+
+        let mut below = vec![];
+        let mut shares = vec![];
+        let mut views = vec![];
+        for (info, paths) in differences {
+            let seen = bar::seen(info.domain, bar::Room::Small);
+            for field in &info.fields {
+                let title = format!("{}: {}", info.name, field.title());
+                let contents = field_contents(paths, &field.name);
+                let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
+                views.push(self.space(&title, paths, &contents, seen)?);
+            }
+        }
+        if !views.is_empty() {
+            below.push(self.tabs(&views)?);
+            shares.push(2.0);
+        }
+        let mut plots = self.overlaid(infos)?;
+        if !plots.is_empty() {
+            let rest = plots.split_off(1);
+            if !rest.is_empty() {
+                plots.push(self.tabs(&rest)?);
+            }
+            below.push(self.stack(components::ContainerKind::Horizontal, &plots, &[])?);
+            shares.push(4.0);
+        }
+        let texts: Vec<Node> =
+            texts.iter().map(|(title, path)| self.text(title, path)).collect::<Result<_, _>>()?;
+        if !texts.is_empty() {
+            below.push(self.tabs(&texts)?);
+            shares.push(2.5);
+        }
+        let below = self.stack(components::ContainerKind::Horizontal, &below, &shares)?;
+        self.stack(components::ContainerKind::Vertical, &[above, below], &[3.0, 2.0])
+    }
+
+    /// A view of each run, all with the same bounds.
+    fn lanes(
+        &mut self,
+        title: &str,
+        infos: &[&RunInfo],
+        domain: Rect,
+        contents: &[&str],
+    ) -> Result<Node, RecordError> {
+        let seen = bar::seen(domain, bar::Room::Large);
+        let views = infos
+            .iter()
+            .map(|info| self.space(&info.name, &Paths::new(&info.name), contents, seen))
+            .collect::<Result<Vec<_>, _>>()?;
+        self.row(title, &views, domain)
+    }
+
+    fn field_lanes(
+        &mut self,
+        name: &str,
+        infos: &[&RunInfo],
+        domain: Rect,
+    ) -> Result<Node, RecordError> {
+        let seen = bar::seen(domain, bar::Room::Large);
+        let mut views = vec![];
+        let mut title = capital(name);
+        for info in infos {
+            let Some(field) = info.fields.iter().find(|field| field.name == name) else { continue };
+            title = capital(&field.title());
+            let paths = Paths::new(&info.name);
+            let contents = field_contents(&paths, name);
+            let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
+            views.push(self.space(&info.name, &paths, &contents, seen)?);
+        }
+        self.row(&title, &views, domain)
+    }
+
+    /// Views of one kind, beside each other; those of flat domains one below the other.
+    fn row(&mut self, title: &str, views: &[Node], domain: Rect) -> Result<Node, RecordError> {
+        let [width, height] = domain.size();
+        let kind = if width > WIDE * height && views.len() < 4 {
+            components::ContainerKind::Vertical
+        } else {
+            components::ContainerKind::Horizontal
+        };
+        let row = self.stack(kind, views, &[])?;
+        self.rec.log(
+            row.path.as_str(),
+            &archetypes::ContainerBlueprint::update_fields().with_display_name(title),
+        )?;
+        Ok(row)
+    }
+
+    /// A plot for each curve that runs have, the same one of all runs in it.
+    fn overlaid(&mut self, infos: &[&RunInfo]) -> Result<Vec<Node>, RecordError> {
+        let mut plots: Vec<(String, String, Vec<String>)> = vec![];
+        for info in infos {
+            let paths = Paths::new(&info.name);
+            for plot in &info.plots {
+                for series in &plot.series {
+                    let title = match plot.series.len() {
+                        1 => plot.title.clone(),
+                        _ => format!("{}: {}", plot.title, series.name),
+                    };
+                    let own = format!("+ {}", paths.curve(&series.path, plot.log10));
+                    match plots.iter_mut().find(|(t, p, _)| *t == title && *p == series.path) {
+                        Some((_, _, contents)) => contents.push(own),
+                        None => plots.push((title, series.path.clone(), vec![own])),
+                    }
+                }
+            }
+        }
+        plots
+            .iter()
+            .map(|(title, _, contents)| {
+                let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
+                // What accumulates leaves room below, what fades leaves room above.
+                let corner = if title.contains("volume") {
+                    components::Corner2D::RightBottom
+                } else {
+                    components::Corner2D::RightTop
+                };
+                self.curves(title, "/", &contents, corner)
+            })
+            .collect()
     }
 
     fn flow(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {
@@ -168,12 +324,7 @@ impl Writer<'_> {
             Some(quantity) => format!("Flow: {}", quantity.title()),
             None => "Flow".to_owned(),
         };
-        self.space(
-            &title,
-            paths,
-            &["+ $origin/world/**", "- $origin/world/fields/**"],
-            bar::seen(info.domain, bar::Room::Large),
-        )
+        self.space(&title, paths, &FLOW, bar::seen(info.domain, bar::Room::Large))
     }
 
     fn fields(&mut self, info: &RunInfo, paths: &Paths) -> Result<Vec<Node>, RecordError> {
@@ -181,13 +332,8 @@ impl Writer<'_> {
         info.fields
             .iter()
             .map(|field| {
-                let own = format!("+ {}/**", paths.field(&field.name));
-                let contents = [
-                    own.as_str(),
-                    "+ $origin/world",
-                    "+ $origin/world/walls",
-                    "+ $origin/world/gauges",
-                ];
+                let contents = field_contents(paths, &field.name);
+                let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
                 self.space(&capital(&field.title()), paths, &contents, seen)
             })
             .collect()
@@ -245,12 +391,19 @@ impl Writer<'_> {
             .map(|series| format!("+ {}", paths.curve(&series.path, plot.log10)))
             .collect();
         let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
-        let node = self.view("TimeSeries", &plot.title, &paths.root.to_string(), &contents)?;
-        self.property(
-            &node,
-            "PlotLegend",
-            &archetypes::PlotLegend::new().with_corner(components::Corner2D::LeftTop),
-        )?;
+        let origin = paths.root.to_string();
+        self.curves(&plot.title, &origin, &contents, components::Corner2D::LeftTop)
+    }
+
+    fn curves(
+        &mut self,
+        title: &str,
+        origin: &str,
+        contents: &[&str],
+        legend: components::Corner2D,
+    ) -> Result<Node, RecordError> {
+        let node = self.view("TimeSeries", title, origin, contents)?;
+        self.property(&node, "PlotLegend", &archetypes::PlotLegend::new().with_corner(legend))?;
         Ok(node)
     }
 

@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use rerun::archetypes;
-
 use super::sinks::{Destinations, Sink};
-use super::{APPLICATION, Finished, RecordError, RerunLog, blueprint, on_dark, rgb};
+use super::{Finished, RecordError, RerunLog, blueprint, stream};
 use crate::frame::{Frame, RunInfo};
 use crate::record::color::OKABE_ITO;
 
@@ -20,12 +18,7 @@ impl Race {
     pub fn open(infos: &[RunInfo], title: &str, path: &Path) -> Result<Self, RecordError> {
         let to = Destinations::open(&[Sink::Save(path.to_owned())])?;
         let id = infos.first().map_or("race", |info| info.recording_id.as_str());
-        let rec = rerun::RecordingStreamBuilder::new(APPLICATION)
-            .recording_id(id)
-            .enabled(true)
-            .set_sinks(to.sinks)?;
-        rec.set_log_time_enabled(false);
-        rec.set_log_tick_enabled(false);
+        let rec = stream(id, to.sinks, false)?;
         blueprint::send_race(&rec, infos)?;
         rec.send_recording_name(title)?;
         let mut lanes = Vec::new();
@@ -34,13 +27,7 @@ impl Race {
             lane.world(info)?;
             lane.texts(info)?;
             lane.curves(info)?;
-            for series in info.plots.iter().flat_map(|plot| &plot.series) {
-                // Curves of several runs share a plot: a colour tells the run.
-                lane.rec.log_static(
-                    lane.paths.curve(&series.path, false),
-                    &archetypes::SeriesLines::update_fields().with_colors([rgb(on_dark(*color))]),
-                )?;
-            }
+            lane.one_color(info, None, *color)?;
             lanes.push(lane);
         }
         if let Some(first) = lanes.first_mut() {

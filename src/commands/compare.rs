@@ -1,0 +1,133 @@
+//! `grainscope compare`: runs side by side, in numbers and in one recording.
+
+use super::{Failure, print};
+use crate::compare::{self, CompareError, Comparison, Member, Tolerance};
+use crate::record::rerun_log::{Served, Sink};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Compare runs: values, curves, fields and scenes, and one recording side by side.
+///
+/// A run is the folder that `run` has left, one of its files, a recording alone (.rrd) or a
+/// summary alone (.json). All are compared with the first one.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folders of runs, recordings or summaries
+    #[arg(required = true, value_name = "RUN")]
+    runs: Vec<PathBuf>,
+    /// The recording; plots are written beside it [default: comparisons/<names>/compare.rrd]
+    #[arg(short, long, value_name = "PATH")]
+    output: Option<PathBuf>,
+    /// Write no recording and no plots
+    #[arg(long, conflicts_with_all = ["output", "serve", "open"])]
+    no_output: bool,
+    /// Exit with 6 if a value is further from the first run's: outflow_volume=1%, or =1e-3 in its
+    /// unit; several may be given
+    #[arg(long = "tolerance", value_name = "KEY=AMOUNT")]
+    tolerances: Vec<Tolerance>,
+    /// Print everything as JSON
+    #[arg(long)]
+    json: bool,
+    /// Serve the viewer with the recording on 127.0.0.1 until interrupted
+    #[arg(long)]
+    serve: bool,
+    /// Port of the served page; 0 takes any free one
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    port: u16,
+    /// Serve, and open the page in the browser
+    #[arg(long)]
+    open: bool,
+}
+
+impl From<CompareError> for Failure {
+    fn from(e: CompareError) -> Self {
+        match e {
+            CompareError::Scene(e) => e.into(),
+            CompareError::Usage(text) => Failure::Usage(text),
+            other => Failure::Environment(other.to_string()),
+        }
+    }
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let members = compare::open_all(&args.runs)?;
+    let found = compare::compare(&members, &args.tolerances)?;
+    let (comparison, served) = if args.no_output {
+        (found.comparison, None)
+    } else {
+        let path = args.output.clone().unwrap_or_else(|| default_output(&members));
+        let mut sinks = vec![Sink::Save(path.clone())];
+        if args.serve || args.open {
+            sinks.push(Sink::Serve { web_port: args.port, grpc_port: 0 });
+        }
+        write(found, &members, &path, &sinks)?
+    };
+    for note in &comparison.notes {
+        eprintln!("note: {note}");
+    }
+    if args.json {
+        let json = serde_json::to_string_pretty(&comparison)
+            .map_err(|e| Failure::Environment(e.to_string()))?;
+        print(&json)?;
+    } else {
+        print(&compare::terminal(&comparison))?;
+    }
+    if let Some(served) = served {
+        show(&served, args.open);
+    }
+    match comparison.tolerances.iter().find(|v| !v.within) {
+        Some(outside) => Err(Failure::Differs(outside.text.clone())),
+        None => Ok(()),
+    }
+}
+
+/// Writes recording and plots.
+pub(super) fn write(
+    found: compare::Found,
+    members: &[Member],
+    path: &Path,
+    sinks: &[Sink],
+) -> Result<(Comparison, Option<Served>), Failure> {
+    let recorded = members.iter().filter(|m| m.recorded.is_some()).count() > 1;
+    let plotted = members.iter().filter(|m| m.table.is_some()).count() > 1;
+    if let Some(folder) = path.parent().filter(|_| recorded || plotted) {
+        std::fs::create_dir_all(folder).map_err(|e| {
+            Failure::Environment(format!("cannot make the folder {}: {e}", folder.display()))
+        })?;
+    }
+    let (mut comparison, finished) = compare::record(found, members, sinks)?;
+    let mut files = vec![];
+    let mut served = None;
+    if let Some(finished) = finished {
+        files.extend(finished.saved.into_iter().map(|s| s.path));
+        served = finished.served;
+    }
+    files.extend(compare::plots(&path.with_extension(""), members)?);
+    comparison.files = files.iter().map(|f| f.display().to_string()).collect();
+    Ok((comparison, served))
+}
+
+/// A folder of its own for each set of runs; comparing again overwrites.
+fn default_output(members: &[Member]) -> PathBuf {
+    const LONGEST: usize = 80;
+    let names: Vec<String> = members
+        .iter()
+        .map(|m| m.name.replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "_"))
+        .collect();
+    let folder: String = names.join("-vs-").chars().take(LONGEST).collect();
+    Path::new("comparisons").join(folder).join("compare.rrd")
+}
+
+fn show(served: &Served, open: bool) {
+    let url = served.url();
+    eprintln!("viewer: {url} (Ctrl-C ends)");
+    if open && let Err(e) = webbrowser::open(url) {
+        eprintln!("warning: no browser could be opened ({e}); open the link yourself");
+    }
+    let interrupted = Arc::new(AtomicBool::new(false));
+    super::run::watch_interrupts(&interrupted);
+    while !interrupted.load(Ordering::SeqCst) {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+}

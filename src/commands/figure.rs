@@ -1,0 +1,250 @@
+//! `grainscope figure`: the source's figures, one command each.
+
+use super::{Failure, compare as comparison, print, run};
+use crate::compare;
+use crate::frame::Picture;
+use crate::plan::Plan;
+use crate::record::number::short;
+use crate::record::rerun_log::Sink;
+use crate::record::sheet::{Row, Sheet, sheet};
+use crate::record::text::duration;
+use crate::record::{folder, info};
+use crate::scene::presets;
+use crate::sim::Run;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// Runs at once: more do not fit into the caches of small machines.
+const AT_ONCE: usize = 2;
+
+/// Parts of a run that the progress bar counts.
+const PARTS: f64 = 1000.0;
+
+/// Make a figure of the source: runs, plots, sheets of snapshots, and a recording side by side.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Which figure
+    figure: Name,
+    /// Coarse and short, in seconds instead of minutes: to see whether it works
+    #[arg(long)]
+    quick: bool,
+    /// Folder of what is made [default: figures/<name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite runs that are already in the folder
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Name {
+    /// Figs. 1 and 3: discharge of a silo for five internal lengths
+    Silo,
+    /// Fig. 4: alignment of texture in shear
+    Alignment,
+}
+
+/// What a figure consists of.
+struct Figure {
+    name: &'static str,
+    preset: &'static str,
+    title: &'static str,
+    /// Runs: name, folder, settings.
+    cases: &'static [(&'static str, &'static str, &'static [&'static str])],
+    /// Settings of all runs.
+    sets: &'static [&'static str],
+    quick: &'static [&'static str],
+    /// Snapshots (s).
+    times: &'static [f64],
+    /// The sheet's name.
+    sheet: &'static str,
+}
+
+/// R/a of 0 to 10/3, as in the source's Fig. 3; snapshots at the times of its Fig. 1.
+const SILO: Figure = Figure {
+    name: "silo",
+    preset: "silo",
+    title: "Discharge of a silo for five internal lengths R, aperture a",
+    cases: &[
+        ("R/a = 0", "alpha_0", &["alpha=0"]),
+        ("R/a = 1/3", "alpha_1_3", &["alpha=1/3"]),
+        ("R/a = 2/3", "alpha_2_3", &["alpha=2/3"]),
+        ("R/a = 5/3", "alpha_5_3", &["alpha=5/3"]),
+        ("R/a = 10/3", "alpha_10_3", &["alpha=10/3"]),
+    ],
+    sets: &["recording.frames=40"],
+    quick: &[
+        "accuracy.cells=2",
+        "time.end=1.42e-3",
+        "recording.times=[4.75e-4, 1.42e-3]",
+        "recording.frames=8",
+    ],
+    times: &[0.0, 4.75e-4, 1.42e-3, 2.85e-3, 3.8e-3],
+    sheet: "snapshots",
+};
+
+/// Times at which the dyed line has sheared by about a half, two, and many times the height.
+const ALIGNMENT: Figure = Figure {
+    name: "alignment",
+    preset: "shear_alignment",
+    title: "Texture in shear: dyed line, directors and isovalues of mean |n_x|",
+    cases: &[("R/H = 0.2", "run", &[])],
+    sets: &["time.end=0.5", "recording.frames=50", "recording.times=[0.05, 0.15, 0.5]"],
+    quick: &["accuracy.cells=16", "recording.frames=10"],
+    times: &[0.05, 0.15, 0.5],
+    sheet: "isovalues",
+};
+
+impl Name {
+    fn figure(self) -> &'static Figure {
+        match self {
+            Name::Silo => &SILO,
+            Name::Alignment => &ALIGNMENT,
+        }
+    }
+}
+
+/// A run that is to be made.
+struct Job {
+    name: &'static str,
+    plan: Arc<Plan>,
+    folder: PathBuf,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let figure = args.figure.figure();
+    let out = args.out.clone().unwrap_or_else(|| Path::new("figures").join(figure.name));
+    let jobs = jobs(figure, args, &out)?;
+    let clock = Instant::now();
+    let pictures = run_all(figure, &jobs)?;
+    let stem = |name: &str| out.join(format!("{}_{name}", figure.name));
+    let reached = pictures.iter().map(Vec::len).min().unwrap_or(0);
+    let times = figure.times.iter().take(reached);
+    let columns = times.map(|t| format!("t = {} s", short(*t))).collect();
+    let rows = jobs.iter().zip(pictures).map(|(job, pictures)| Row {
+        name: job.name.into(),
+        info: info::run_info(&job.plan, job.name),
+        pictures,
+    });
+    sheet(
+        &stem(figure.sheet),
+        &Sheet { title: figure.title.into(), columns, rows: rows.collect() },
+    )?;
+    let mut said = String::new();
+    if jobs.len() > 1 {
+        said = side_by_side(&jobs, &out.join(format!("{}.rrd", figure.name)))?;
+    }
+    for suffix in [".svg", ".png"] {
+        said += &format!("wrote {}{suffix}\n", stem(figure.sheet).display());
+    }
+    for job in &jobs {
+        said +=
+            &format!("wrote {} (recording, series, summary, scene, plots)\n", job.folder.display());
+    }
+    print(&format!("{said}in {}", duration(clock.elapsed().as_secs_f64())))
+}
+
+/// Plans and folders of all runs: what is wrong with one is told before anything is computed.
+fn jobs(figure: &Figure, args: &Args, out: &Path) -> Result<Vec<Job>, Failure> {
+    let source = presets::find(figure.preset)?;
+    let quick: &[&str] = if args.quick { figure.quick } else { &[] };
+    let mut jobs = vec![];
+    for (name, folder, sets) in figure.cases {
+        let sets = figure.sets.iter().chain(quick).chain(*sets).map(|s| s.to_string());
+        let (_, plan) = super::resolve(&source.with_sets(&sets.collect::<Vec<_>>())?)?;
+        let folder = folder::create(folder, Some(&out.join(folder)), args.force)?;
+        jobs.push(Job { name, plan: Arc::new(plan), folder });
+    }
+    Ok(jobs)
+}
+
+/// Runs everything, some at once; pictures of each run at the figure's times.
+fn run_all(figure: &Figure, jobs: &[Job]) -> Result<Vec<Vec<Picture>>, Failure> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    run::watch_interrupts(&interrupted);
+    let target = ProgressDrawTarget::stderr_with_hz(8);
+    let bar = ProgressBar::with_draw_target(Some((PARTS * jobs.len() as f64) as u64), target);
+    if let Ok(style) =
+        ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed} of about {duration}")
+    {
+        bar.set_style(style);
+    }
+    let next = AtomicUsize::new(0);
+    let done: Mutex<Vec<Option<Vec<Picture>>>> = Mutex::new(jobs.iter().map(|_| None).collect());
+    let fault: Mutex<Option<Failure>> = Mutex::new(None);
+    std::thread::scope(|scope| {
+        for _ in 0..AT_ONCE.min(jobs.len()) {
+            scope.spawn(|| {
+                while let Some((k, job)) = take(&next, jobs) {
+                    match make(figure, job, &interrupted, &bar) {
+                        Ok(pictures) => {
+                            done.lock().unwrap_or_else(PoisonError::into_inner)[k] = Some(pictures);
+                        }
+                        Err(e) => {
+                            // One fault ends the others after their steps; the first one is told.
+                            interrupted.store(true, Ordering::SeqCst);
+                            fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(e);
+                            return;
+                        }
+                    }
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    match fault.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(e) => Err(e),
+        None => {
+            let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+            Ok(done.into_iter().flatten().collect())
+        }
+    }
+}
+
+/// The next job that nobody has taken.
+fn take<'a>(next: &AtomicUsize, jobs: &'a [Job]) -> Option<(usize, &'a Job)> {
+    let k = next.fetch_add(1, Ordering::SeqCst);
+    Some((k, jobs.get(k)?))
+}
+
+/// One run and its pictures.
+fn make(
+    figure: &Figure,
+    job: &Job,
+    interrupted: &Arc<AtomicBool>,
+    bar: &ProgressBar,
+) -> Result<Vec<Picture>, Failure> {
+    let end = job.plan.clock.end * job.plan.units.time;
+    let mut pictures = vec![];
+    let mut counted = 0;
+    let summary = run::into_folder(&job.plan, job.folder.clone(), interrupted, |run: &dyn Run| {
+        let time = run.row().time;
+        let due = figure.times.get(pictures.len());
+        if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
+            pictures.push(run.picture());
+        }
+        let part = (PARTS * time / end) as u64;
+        bar.inc(part.saturating_sub(counted));
+        counted = counted.max(part);
+    })?;
+    let outflow = summary.gauges.values().next();
+    let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} m2", g.volume));
+    let took = duration(summary.seconds.get("total").copied().unwrap_or_default());
+    bar.suspend(|| eprintln!("{}: {} steps in {took}{outflow}", job.name, summary.steps));
+    Ok(pictures)
+}
+
+/// Compares all runs with the first one.
+fn side_by_side(jobs: &[Job], path: &Path) -> Result<String, Failure> {
+    let folders: Vec<PathBuf> = jobs.iter().map(|job| job.folder.clone()).collect();
+    let mut members = compare::open_all(&folders)?;
+    for (member, job) in members.iter_mut().zip(jobs) {
+        member.rename(job.name);
+    }
+    let found = compare::compare(&members, &[])?;
+    let (found, _) = comparison::write(found, &members, path, &[Sink::Save(path.to_owned())])?;
+    Ok(compare::terminal(&found))
+}

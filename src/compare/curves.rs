@@ -1,0 +1,39 @@
+//! How far curves of two runs are from each other.
+
+use super::{CurveChange, Member};
+
+/// Curves that are compared: errors and counts are not, whatever they are called.
+fn compared(key: &str) -> bool {
+    let name = key.rsplit('.').next().unwrap_or(key);
+    let left_out =
+        ["step", "time", "dt", "iterations", "particles", "stabilisation", super::table::SECONDS];
+    !left_out.contains(&name) && !name.ends_with("_error") && !name.ends_with("_drift")
+}
+
+/// The largest distance of each curve from the first run's, up to a time.
+pub fn changes(members: &[Member], until: f64) -> Vec<CurveChange> {
+    let Some((first, others)) = members.split_first() else { return vec![] };
+    let Some(a) = &first.table else { return vec![] };
+    let mut list = vec![];
+    for (member, b) in others.iter().filter_map(|m| Some((m, m.table.as_ref()?))) {
+        for (key, column) in a.columns.iter().filter(|(key, _)| compared(key)) {
+            let Some(other) = b.columns.get(key) else { continue };
+            let shared = || a.times().iter().zip(column).filter(|(t, _)| !super::later(**t, until));
+            let scale = shared().map(|(_, v)| v.abs()).fold(0.0, f64::max);
+            let mut worst = (0.0, 0.0);
+            for (&time, value) in shared() {
+                let Some(value_b) = b.at(other, time) else { continue };
+                let distance = (value_b - value).abs();
+                if distance > worst.0 {
+                    worst = (distance, time);
+                }
+            }
+            let largest = if worst.0 > 0.0 { worst.0 / scale } else { 0.0 };
+            if largest.is_finite() {
+                let run = member.name.clone();
+                list.push(CurveChange { key: key.clone(), run, largest, at: worst.1 });
+            }
+        }
+    }
+    list
+}

@@ -1,0 +1,176 @@
+//! Differences of fields. Particles of two runs have no one-to-one match; fields on a common grid
+//! do.
+
+use super::{Member, later};
+use crate::frame::{GridField, Quantity, Rect};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Share of the differences that the colour scale covers: tips at corners would drown the rest.
+const COVERED: f64 = 0.995;
+
+/// How far a field is from the first run's.
+#[derive(Clone, Debug, Serialize)]
+pub struct FieldChange {
+    pub field: String,
+    pub run: String,
+    /// Largest over time: root mean square of the difference over that of the first run's field.
+    pub largest: f64,
+    /// Where (s).
+    pub at: f64,
+    /// At the last time both have.
+    pub last: f64,
+}
+
+/// Fields of one run less those of the first.
+pub struct Pair {
+    /// The first run and the other one.
+    pub runs: [usize; 2],
+    /// What both show.
+    pub domain: Rect,
+    pub quantities: Vec<Quantity>,
+    /// By time (s).
+    pub frames: Vec<(f64, Vec<GridField>)>,
+    pub changes: Vec<FieldChange>,
+}
+
+type Pictures = Vec<(f64, GridField)>;
+
+/// Differences of each run to the first, at the times of the first one's pictures.
+pub fn differences(members: &[Member], until: f64, notes: &mut Vec<String>) -> Vec<Pair> {
+    let fields: Vec<Option<BTreeMap<String, Pictures>>> = members
+        .iter()
+        .map(|m| Some(m.recorded.as_ref()?.fields(m.info.as_ref()?.domain)))
+        .collect();
+    let mut pairs = vec![];
+    for k in 1..members.len() {
+        let (Some(a), Some(b)) = (&fields[0], &fields[k]) else { continue };
+        let (Some(info_a), Some(info_b)) = (&members[0].info, &members[k].info) else { continue };
+        let names = || format!("{} and {}", members[0].name, members[k].name);
+        let Some(domain) = info_a.domain.common(info_b.domain) else {
+            notes.push(format!("the domains of {} do not meet: no fields to compare", names()));
+            continue;
+        };
+        let quantities: Vec<Quantity> = (info_a.fields.iter())
+            .filter(|q| a.contains_key(&q.name) && b.contains_key(&q.name))
+            .map(|q| Quantity { signed: true, ..q.clone() })
+            .collect();
+        if quantities.is_empty() {
+            notes.push(format!(
+                "{} have no field in common whose numbers were recorded: no difference is shown",
+                names()
+            ));
+            continue;
+        }
+        if info_a.domain != info_b.domain {
+            notes.push(format!(
+                "the domains of {} differ; fields are compared where they overlap",
+                names()
+            ));
+        }
+        pairs.push(pair(members, k, domain, quantities, [a, b], until));
+    }
+    pairs
+}
+
+fn pair(
+    members: &[Member],
+    k: usize,
+    domain: Rect,
+    quantities: Vec<Quantity>,
+    [a, b]: [&BTreeMap<String, Pictures>; 2],
+    until: f64,
+) -> Pair {
+    let mut frames: Vec<(f64, Vec<GridField>)> = vec![];
+    let mut changes = vec![];
+    for quantity in &quantities {
+        let (a, b) = (&a[&quantity.name], &b[&quantity.name]);
+        let mut list: Pictures = vec![];
+        let mut change = FieldChange {
+            field: quantity.name.clone(),
+            run: members[k].name.clone(),
+            largest: 0.0,
+            at: 0.0,
+            last: 0.0,
+        };
+        for (time, field) in a.iter().filter(|(t, _)| !later(*t, until)) {
+            let Some(other) = at_time(b, *time) else { continue };
+            let grid = [field.nx, field.ny];
+            let (base, other) = (on_grid(field, domain, grid), on_grid(&other, domain, grid));
+            let values: Vec<f32> =
+                other.values.iter().zip(&base.values).map(|(b, a)| b - a).collect();
+            let size = rms(&base.values);
+            change.last = if size > 0.0 { rms(&values) / size } else { 0.0 };
+            if change.last > change.largest {
+                (change.largest, change.at) = (change.last, *time);
+            }
+            list.push((*time, GridField { values, ..base }));
+        }
+        let reach = reach(&list);
+        for (time, mut field) in list {
+            field.range = [-reach, reach];
+            match frames.iter_mut().find(|(t, _)| *t == time) {
+                Some((_, fields)) => fields.push(field),
+                None => frames.push((time, vec![field])),
+            }
+        }
+        changes.push(change);
+    }
+    Pair { runs: [0, k], domain, quantities, frames, changes }
+}
+
+/// A field on the grid that is compared on; one that is there already is not interpolated.
+fn on_grid(field: &GridField, domain: Rect, [nx, ny]: [usize; 2]) -> GridField {
+    let rect = field.rect();
+    let near = |a: f32, b: f32, cell: f32| (a - b).abs() < 1e-3 * cell;
+    let same = (field.nx, field.ny) == (nx, ny)
+        && (0..2).all(|c| {
+            near(rect.min[c], domain.min[c], field.cell[c])
+                && near(rect.max[c], domain.max[c], field.cell[c])
+        });
+    if same { field.clone() } else { field.on(domain, nx, ny) }
+}
+
+/// A field at a time, between the pictures before and after; `None` outside.
+fn at_time(pictures: &[(f64, GridField)], time: f64) -> Option<GridField> {
+    let room = super::SAME_TIME * time.abs();
+    let after = pictures.partition_point(|(t, _)| *t < time - room);
+    let (t1, next) = pictures.get(after)?;
+    if (t1 - time).abs() <= room {
+        return Some(next.clone());
+    }
+    let (t0, last) = pictures.get(after.checked_sub(1)?)?;
+    let share = ((time - t0) / (t1 - t0)) as f32;
+    let mix = |(a, b): (&f32, &f32)| a + share * (b - a);
+    (last.values.len() == next.values.len()).then(|| GridField {
+        values: last.values.iter().zip(&next.values).map(mix).collect(),
+        ..next.clone()
+    })
+}
+
+fn rms(values: &[f32]) -> f64 {
+    let finite = || values.iter().filter(|v| v.is_finite()).map(|&v| f64::from(v));
+    (finite().map(|v| v * v).sum::<f64>() / finite().count().max(1) as f64).sqrt()
+}
+
+/// The end of a colour scale for all times.
+fn reach(pictures: &[(f64, GridField)]) -> f32 {
+    let mut sizes: Vec<f32> = pictures
+        .iter()
+        .flat_map(|(_, f)| &f.values)
+        .filter(|v| v.is_finite())
+        .map(|v| v.abs())
+        .collect();
+    sizes.sort_by(f32::total_cmp);
+    let place = (COVERED * sizes.len() as f64) as usize;
+    let covered = sizes.get(place.min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0);
+    // Differences in a corner only are still seen.
+    let reach = if covered > 0.0 { covered } else { sizes.last().copied().unwrap_or(0.0) };
+    if reach > 0.0 { reach } else { 1.0 }
+}
+
+/// A difference in words, for titles.
+pub fn title(members: &[Member], runs: [usize; 2]) -> String {
+    let [a, b] = runs.map(|k| &members[k].name);
+    format!("{b} − {a}")
+}

@@ -1,0 +1,380 @@
+//! One run of a comparison, read from what is there of it: a folder, a recording, a summary.
+
+use super::table::{SECONDS, Table};
+use super::{RunHead, later};
+use crate::frame::RunInfo;
+use crate::record::folder::FILES;
+use crate::record::info::run_info;
+use crate::record::rerun_log::{ReadError, Recorded};
+use crate::scene::{self, SceneError, SceneSource, scene_hash};
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Why runs cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    #[error("{}: there is no such file or folder; give a run's folder, a recording (.rrd) or a summary.json", .0.display())]
+    Missing(PathBuf),
+    #[error("{}: holds no run; expected {} in it", .0.display(), FILES[..4].join(", "))]
+    NoRun(PathBuf),
+    #[error("{}: is neither a recording (.rrd) nor a summary (.json)", .0.display())]
+    Unknown(PathBuf),
+    #[error("{}: {cause}", path.display())]
+    Broken { path: PathBuf, cause: String },
+    #[error(transparent)]
+    Recording(#[from] ReadError),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error("{0}")]
+    Usage(String),
+}
+
+/// What a run is known from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A folder with a series.
+    Folder,
+    /// A recording alone.
+    Recording,
+    /// A summary alone: numbers of the end.
+    Summary,
+}
+
+/// What is read of `summary.json`.
+#[derive(Clone, Debug, Deserialize)]
+struct Summary {
+    schema: u32,
+    scene: String,
+    scene_hash: String,
+    state_hash: String,
+    ending: String,
+    #[serde(default)]
+    error: Option<String>,
+    steps: u64,
+    time: f64,
+    // Numbers that are not finite are null in JSON.
+    max_speed: Option<f64>,
+    rms_speed: Option<f64>,
+    particles: u64,
+    gauges: IndexMap<String, Gauge>,
+    volume_drift: IndexMap<String, Option<f64>>,
+    #[serde(default)]
+    mean_alignment: Option<f64>,
+    #[serde(default)]
+    recording: Option<PathBuf>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Gauge {
+    volume: Option<f64>,
+    rate: Option<f64>,
+}
+
+/// A run that was read.
+pub struct Member {
+    pub name: String,
+    pub path: PathBuf,
+    pub kind: Kind,
+    /// Where it ends (s).
+    pub end: f64,
+    pub table: Option<Table>,
+    /// The resolved scene.
+    pub scene_toml: Option<String>,
+    pub info: Option<RunInfo>,
+    pub recorded: Option<Recorded>,
+    /// What is odd about it.
+    pub notes: Vec<String>,
+    summary: Option<Summary>,
+    scene: Option<(String, String)>,
+}
+
+/// Reads runs and gives them names that differ.
+pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, CompareError> {
+    if paths.len() < 2 {
+        return Err(CompareError::Usage(
+            "one run alone cannot be compared; give two or more: grainscope compare runs/silo \
+             runs/silo-2"
+                .into(),
+        ));
+    }
+    let mut members: Vec<Member> = vec![];
+    for path in paths {
+        let member = Member::open(path)?;
+        let place = |m: &Member| std::fs::canonicalize(&m.path).unwrap_or(m.path.clone());
+        if let Some(twin) = members.iter().find(|m| place(m) == place(&member)) {
+            return Err(CompareError::Usage(format!(
+                "{} and {} are the same run; give two different ones",
+                twin.path.display(),
+                path.display()
+            )));
+        }
+        members.push(member);
+    }
+    for k in 1..members.len() {
+        let taken = |name: &str| members[..k].iter().any(|m| m.name == name);
+        if taken(&members[k].name) {
+            let name = members[k].name.clone();
+            let fresh = (2..).map(|n| format!("{name} ({n})")).find(|name| !taken(name));
+            members[k].rename(&fresh.unwrap_or(name));
+        }
+    }
+    Ok(members)
+}
+
+impl Member {
+    /// Reads a run from its folder, one of its files, a recording or a summary.
+    pub fn open(path: &Path) -> Result<Member, CompareError> {
+        if path.is_dir() {
+            return Self::folder(path);
+        }
+        if !path.is_file() {
+            return Err(CompareError::Missing(path.to_owned()));
+        }
+        let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let beside = path.parent().unwrap_or(Path::new("")).join("series.csv");
+        if FILES.contains(&file.as_str()) && beside.is_file() {
+            let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+            return Self::folder(folder.unwrap_or(Path::new(".")));
+        }
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("rrd") => Self::recording(path),
+            Some("json") => Self::golden(path),
+            _ => Err(CompareError::Unknown(path.to_owned())),
+        }
+    }
+
+    fn folder(folder: &Path) -> Result<Member, CompareError> {
+        let file = |name: &str| Some(folder.join(name)).filter(|p| p.is_file());
+        let Some(series) = file("series.csv") else {
+            return match (file("recording.rrd"), file("summary.json")) {
+                (Some(recording), _) => Self::recording(&recording),
+                (None, Some(summary)) => Self::golden(&summary),
+                (None, None) => Err(CompareError::NoRun(folder.to_owned())),
+            };
+        };
+        let broken = |cause| CompareError::Broken { path: series.clone(), cause };
+        let table = Table::parse(&read(&series)?).map_err(broken)?;
+        let mut member = Member {
+            name: folder_name(folder),
+            path: folder.to_owned(),
+            kind: Kind::Folder,
+            end: table.end(),
+            table: Some(table),
+            scene_toml: file("scene.toml").map(|p| read(&p)).transpose()?,
+            info: None,
+            recorded: None,
+            notes: vec![],
+            summary: file("summary.json").map(|p| Summary::read(&p)).transpose()?,
+            scene: None,
+        };
+        member.note_ending();
+        let elsewhere = member.summary.as_ref().and_then(|s| s.recording.clone());
+        let recording = file("recording.rrd").or(elsewhere.filter(|p| p.is_file()));
+        if let Some(recording) = recording {
+            match Recorded::open(&recording) {
+                Ok(recorded) => member.take(recorded),
+                // The numbers are elsewhere: pictures are what is missed.
+                Err(e) => member.notes.push(format!("{e}; it is compared without pictures")),
+            }
+        }
+        member.resolve()?;
+        Ok(member)
+    }
+
+    fn recording(path: &Path) -> Result<Member, CompareError> {
+        let recorded = Recorded::open(path)?;
+        let broken =
+            |cause: &str| CompareError::Broken { path: path.to_owned(), cause: cause.into() };
+        let table = Table::of_recording(&recorded.curves())
+            .ok_or_else(|| broken("the recording holds no series; was it cut at the start?"))?;
+        let mut member = Member {
+            name: match path.file_stem().map(|s| s.to_string_lossy()) {
+                Some(stem) if stem != "recording" => stem.into_owned(),
+                _ => recorded.run.clone(),
+            },
+            path: path.to_owned(),
+            kind: Kind::Recording,
+            end: table.end(),
+            table: Some(table),
+            scene_toml: recorded.scene_toml(),
+            info: None,
+            recorded: None,
+            notes: vec![],
+            summary: None,
+            scene: None,
+        };
+        member.take(recorded);
+        member.resolve()?;
+        Ok(member)
+    }
+
+    fn golden(path: &Path) -> Result<Member, CompareError> {
+        let summary = Summary::read(path)?;
+        let beside = path.parent().unwrap_or(Path::new("")).join("scene.toml");
+        let named = path.file_stem().is_some_and(|s| s != "summary");
+        let mut member = Member {
+            name: if named {
+                path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+            } else {
+                folder_name(path.parent().unwrap_or(Path::new("")))
+            },
+            path: path.to_owned(),
+            kind: Kind::Summary,
+            end: summary.time,
+            table: None,
+            scene_toml: (!named && beside.is_file()).then(|| read(&beside)).transpose()?,
+            info: None,
+            recorded: None,
+            notes: vec![],
+            summary: Some(summary),
+            scene: None,
+        };
+        member.note_ending();
+        member.resolve()?;
+        Ok(member)
+    }
+
+    fn note_ending(&mut self) {
+        match &self.summary {
+            Some(s) if s.ending != "finished" => self.notes.push(format!(
+                "{} did not finish ({}{})",
+                self.name,
+                s.ending.replace('_', " "),
+                s.error.as_ref().map_or(String::new(), |e| format!(": {e}"))
+            )),
+            None => self.notes.push(format!(
+                "{} has no summary.json: it was ended from outside, or still runs",
+                self.name
+            )),
+            _ => {}
+        }
+    }
+
+    fn take(&mut self, recorded: Recorded) {
+        if let Some(cause) = &recorded.cut {
+            self.notes.push(format!(
+                "the recording of {} is cut ({cause}); what precedes is compared",
+                self.name
+            ));
+        }
+        self.recorded = Some(recorded);
+    }
+
+    /// What the scene says of domain, walls and plots.
+    fn resolve(&mut self) -> Result<(), CompareError> {
+        let Some(text) = &self.scene_toml else { return Ok(()) };
+        let source = SceneSource::new(format!("scene of {}", self.path.display()), text.as_str());
+        let scene = scene::parse(&source)?;
+        let plan = crate::plan::resolve(&scene).map_err(|e| e.with_source(&source))?;
+        self.scene = Some((scene.name.clone(), scene_hash(&scene)));
+        self.info = Some(run_info(&plan, &self.name));
+        Ok(())
+    }
+
+    /// Gives the run another name.
+    pub fn rename(&mut self, name: &str) {
+        self.name = name.to_owned();
+        if let Some(info) = &mut self.info {
+            info.name = name.to_owned();
+        }
+    }
+
+    pub fn state_hash(&self) -> Option<&str> {
+        self.summary.as_ref().map(|s| s.state_hash.as_str())
+    }
+
+    pub(super) fn head(&self, first: &Member) -> RunHead {
+        let known = self.summary.as_ref().map(|s| (s.scene.clone(), s.scene_hash.clone()));
+        let (scene, scene_hash) = known.or(self.scene.clone()).unzip();
+        RunHead {
+            name: self.name.clone(),
+            path: self.path.display().to_string(),
+            kind: self.kind,
+            scene,
+            scene_hash,
+            state_hash: self.state_hash().map(String::from),
+            end: self.end,
+            identical: self.state_hash().zip(first.state_hash()).map(|(a, b)| a == b),
+        }
+    }
+
+    /// Numbers at a time; `None` if they are not known there.
+    pub(super) fn values_at(&self, time: f64) -> Option<IndexMap<String, f64>> {
+        let mut values = IndexMap::from([("end".to_string(), self.end)]);
+        match &self.table {
+            Some(table) => {
+                for (name, column) in &table.columns {
+                    let value = table.at(column, time).filter(|v| !v.is_nan());
+                    if let (Some(value), false) = (value, name == "time" || name == "dt") {
+                        values.insert(name.clone(), value);
+                    }
+                }
+                // The last, for a reader: it depends on the machine.
+                if let Some(seconds) = values.shift_remove(SECONDS) {
+                    values.insert(SECONDS.into(), seconds);
+                }
+            }
+            None if later(self.end, time) => return None,
+            None => values.extend(self.summary.as_ref()?.values()),
+        }
+        Some(values)
+    }
+}
+
+impl Summary {
+    fn read(path: &Path) -> Result<Summary, CompareError> {
+        let broken = |cause: String| CompareError::Broken { path: path.to_owned(), cause };
+        let summary: Summary = serde_json::from_str(&read(path)?).map_err(|e| {
+            broken(format!(
+                "is no summary of a run: {e}; expected a summary.json as `run` writes it"
+            ))
+        })?;
+        if summary.schema != crate::record::summary::SCHEMA {
+            return Err(broken(format!(
+                "has schema {}; this program reads {}: make it anew with `grainscope run`",
+                summary.schema,
+                crate::record::summary::SCHEMA
+            )));
+        }
+        Ok(summary)
+    }
+
+    /// Numbers under the names that the series gives them.
+    fn values(&self) -> IndexMap<String, f64> {
+        let mut values = IndexMap::new();
+        let mut put = |key: &str, value: Option<f64>| {
+            values.extend(value.map(|value| (key.to_string(), value)));
+        };
+        put("step", Some(self.steps as f64));
+        put("particles", Some(self.particles as f64));
+        for (name, gauge) in &self.gauges {
+            let prefix = if self.gauges.len() > 1 { format!("{name}.") } else { String::new() };
+            put(&format!("{prefix}outflow_volume"), gauge.volume);
+            put(&format!("{prefix}outflow_rate"), gauge.rate);
+        }
+        put("max_speed", self.max_speed);
+        put("rms_speed", self.rms_speed);
+        put("mean_alignment", self.mean_alignment);
+        for (material, drift) in &self.volume_drift {
+            put(&format!("{material}.volume_drift"), *drift);
+        }
+        values
+    }
+}
+
+fn read(path: &Path) -> Result<String, CompareError> {
+    std::fs::read_to_string(path).map_err(|e| CompareError::Broken {
+        path: path.to_owned(),
+        cause: format!("cannot be read: {e}"),
+    })
+}
+
+/// The folder's own name, also of `.`.
+fn folder_name(folder: &Path) -> String {
+    let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned());
+    name(folder)
+        .or_else(|| name(&std::fs::canonicalize(folder).ok()?))
+        .unwrap_or_else(|| "run".to_owned())
+}

@@ -1,0 +1,230 @@
+//! Recordings read back: the scene, the curves and the numbers of the fields of one run.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use rerun::external::re_log_encoding::{DecoderApp, RRD_FOURCC, StreamFooter};
+use rerun::external::re_log_types::{StoreKind, TimelineName};
+use rerun::log::{Chunk, LogMsg};
+use rerun::{archetypes, components};
+
+use super::{RUNS, SIM_TIME, WALL_TIME};
+use crate::frame::{GridField, Rect};
+
+/// Why a recording cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file cannot be opened.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is another kind of file, or cut before anything was in it.
+    #[error("{}: is no recording that can be read: {cause}; expected an .rrd file of a run", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder says.
+        cause: String,
+    },
+    /// A recording, but not of one run.
+    #[error(
+        "{}: holds {found}; a comparison takes recordings of one run each", path.display()
+    )]
+    NotOneRun {
+        /// The file.
+        path: PathBuf,
+        /// What it holds instead.
+        found: String,
+    },
+}
+
+/// One number of a curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Simulated time (s).
+    pub time_s: f64,
+    /// Seconds computed so far.
+    pub wall_s: f64,
+    /// The number.
+    pub value: f64,
+}
+
+/// A recording of one run, read back.
+pub struct Recorded {
+    /// The run's name in the recording.
+    pub run: String,
+    /// Why the end is missing, if the file is cut.
+    pub cut: Option<String>,
+    pub(super) chunks: Vec<Chunk>,
+}
+
+/// The parts of a chunk's path below its run; `None` for what belongs to no run.
+pub(super) fn below_run(chunk: &Chunk) -> Option<(String, Vec<String>)> {
+    let mut parts = chunk.entity_path().iter().map(|part| part.unescaped_str().to_owned());
+    (parts.next()? == RUNS).then_some(())?;
+    Some((parts.next()?, parts.collect()))
+}
+
+impl Recorded {
+    /// Reads a file. One that is cut gives what precedes the cut.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let opened = |source| ReadError::Open { path: path.to_owned(), source };
+        let mut file = File::open(path).map_err(opened)?;
+        let closed = is_closed(&mut file).map_err(opened)?;
+        let unreadable = |cause: String| ReadError::Unreadable { path: path.to_owned(), cause };
+        let messages = DecoderApp::decode_eager(BufReader::new(file))
+            .map_err(|e| unreadable(e.to_string()))?;
+        let mut chunks = Vec::new();
+        let mut cut = (!closed).then(|| "its end is missing".to_owned());
+        for message in messages {
+            let chunk = match message {
+                Ok(LogMsg::ArrowMsg(store, message)) if store.kind() == StoreKind::Recording => {
+                    Chunk::from_arrow_msg(&message).map_err(|e| e.to_string())
+                }
+                Ok(_) => continue,
+                Err(e) => Err(e.to_string()),
+            };
+            match chunk {
+                Ok(chunk) => chunks.push(chunk),
+                Err(cause) => {
+                    cut = Some(cause);
+                    break;
+                }
+            }
+        }
+        let runs: BTreeSet<String> = chunks.iter().filter_map(|c| Some(below_run(c)?.0)).collect();
+        let mut names = runs.into_iter();
+        match (names.next(), names.count()) {
+            (Some(run), 0) => Ok(Self { run, cut, chunks }),
+            (Some(_), more) => Err(ReadError::NotOneRun {
+                path: path.to_owned(),
+                found: format!("{} runs side by side", more + 1),
+            }),
+            (None, _) => match cut {
+                Some(cause) => Err(unreadable(cause)),
+                None if chunks.is_empty() => Err(unreadable("it is empty".to_owned())),
+                None => Err(ReadError::NotOneRun {
+                    path: path.to_owned(),
+                    found: "no run of grainscope".to_owned(),
+                }),
+            },
+        }
+    }
+
+    /// Chunks of the run, with their paths below it.
+    pub(super) fn of_run(&self) -> impl Iterator<Item = (&Chunk, Vec<String>)> {
+        self.chunks.iter().filter_map(|chunk| Some((chunk, below_run(chunk)?.1)))
+    }
+
+    /// The resolved scene, as TOML.
+    pub fn scene_toml(&self) -> Option<String> {
+        let component = archetypes::TextDocument::descriptor_text().component;
+        self.of_run().filter(|(_, path)| *path == ["scene"]).find_map(|(chunk, _)| {
+            let text = chunk.iter_slices::<String>(component).next()?.first()?.to_string();
+            // It is fenced for the viewer.
+            let fence = text.chars().take_while(|&c| c == '`').collect::<String>();
+            let inside = text.strip_prefix(fence.as_str())?.split_once('\n')?.1;
+            Some(inside.trim_end().strip_suffix(fence.as_str())?.to_owned())
+        })
+    }
+
+    /// All curves, by the path that their scalars have; without logarithms.
+    pub fn curves(&self) -> BTreeMap<String, Vec<Sample>> {
+        let component = archetypes::Scalars::descriptor_scalars().component;
+        let mut curves: BTreeMap<String, Vec<Sample>> = BTreeMap::new();
+        for (chunk, path) in self.of_run().filter(|(chunk, _)| !chunk.is_static()) {
+            if path.last().is_some_and(|part| part == "log10") {
+                continue;
+            }
+            let times = seconds(chunk, SIM_TIME, component);
+            let walls = seconds(chunk, WALL_TIME, component);
+            let values = chunk.iter_slices::<f64>(component).filter_map(|v| v.first().copied());
+            let samples: Vec<Sample> = times
+                .into_iter()
+                .zip(walls)
+                .zip(values)
+                .map(|((time_s, wall_s), value)| Sample { time_s, wall_s, value })
+                .collect();
+            if !samples.is_empty() {
+                curves.entry(path.join("/")).or_default().extend(samples);
+            }
+        }
+        for samples in curves.values_mut() {
+            samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        }
+        curves
+    }
+
+    /// The pictures of each field that fills `domain`, by time.
+    pub fn fields(&self, domain: Rect) -> BTreeMap<String, Vec<(f64, GridField)>> {
+        let component = archetypes::Tensor::descriptor_data().component;
+        let mut fields: BTreeMap<String, Vec<(f64, GridField)>> = BTreeMap::new();
+        for (chunk, path) in self.of_run() {
+            let [world, folder, name, last] = path.as_slice() else { continue };
+            if (world.as_str(), folder.as_str(), last.as_str()) != ("world", "fields", "values") {
+                continue;
+            }
+            let times = seconds(chunk, SIM_TIME, component);
+            for (time, batch) in
+                times.into_iter().zip(chunk.iter_component::<components::TensorData>(component))
+            {
+                let field = batch.as_slice().first().and_then(|t| field(name, domain, &t.0));
+                if let Some(field) = field {
+                    fields.entry(name.clone()).or_default().push((time, field));
+                }
+            }
+        }
+        for pictures in fields.values_mut() {
+            pictures.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        fields
+    }
+}
+
+/// Whether a file has the footer that is written when a recording is closed. The decoder takes an
+/// end without one for an end.
+fn is_closed(file: &mut File) -> std::io::Result<bool> {
+    // It ends with its two names and the number of its entries.
+    const TAIL: i64 = 12;
+    let mut names = [0; 8];
+    if file.metadata()?.len() > TAIL.unsigned_abs() {
+        file.seek(SeekFrom::End(-TAIL))?;
+        file.read_exact(&mut names)?;
+    }
+    file.rewind()?;
+    Ok(names == [RRD_FOURCC, StreamFooter::RRD_IDENTIFIER].concat().as_slice())
+}
+
+/// Seconds on a timeline of the rows that hold a component.
+fn seconds(
+    chunk: &Chunk,
+    timeline: &'static str,
+    component: rerun::ComponentIdentifier,
+) -> Vec<f64> {
+    chunk
+        .iter_component_indices(TimelineName::from(timeline), component)
+        .map(|(time, _)| time.as_i64() as f64 * 1e-9)
+        .collect()
+}
+
+fn field(name: &str, domain: Rect, tensor: &rerun::datatypes::TensorData) -> Option<GridField> {
+    let rerun::datatypes::TensorBuffer::F32(values) = &tensor.buffer else { return None };
+    let [ny, nx] = *tensor.shape.as_ref() else { return None };
+    let (nx, ny) = (usize::try_from(nx).ok()?, usize::try_from(ny).ok()?);
+    let size = domain.size();
+    (nx * ny > 0 && values.len() == nx * ny).then(|| GridField {
+        name: name.to_owned(),
+        origin: domain.min,
+        cell: [size[0] / nx as f32, size[1] / ny as f32],
+        nx,
+        ny,
+        values: values.to_vec(),
+        range: [0.0, 1.0],
+    })
+}

@@ -1,0 +1,120 @@
+//! Recordings of several runs in one, under one time cursor: a view for each, curves overlaid,
+//! differences of their fields.
+
+use rerun::{EntityPath, EntityPathPart, archetypes};
+
+use super::sinks::{Destinations, Sink};
+use super::{Finished, Paths, RecordError, Recorded, RerunLog, SIM_TIME, blueprint, stream};
+use crate::frame::{GridField, Rect, RunInfo};
+use crate::record::color::OKABE_ITO;
+
+/// The next instant: what is there at an end stays visible at the end.
+const AFTER: f64 = 1e-9;
+
+/// Where differences live.
+const DIFFERENCES: &str = "differences";
+
+/// A run to be shown, under the name that its [`RunInfo`] has.
+pub struct Lane<'a> {
+    /// What does not change during the run.
+    pub info: RunInfo,
+    /// What changes.
+    pub recorded: &'a Recorded,
+}
+
+/// What one run has less what another one has.
+pub struct Difference {
+    /// Names both, the domain they share, walls, and the fields.
+    pub info: RunInfo,
+    /// Fields by time (s).
+    pub frames: Vec<(f64, Vec<GridField>)>,
+    /// From where on there is none, if a run goes on after the other's end (s).
+    pub ends: Option<f64>,
+}
+
+/// Texts and identity of a comparison.
+pub struct SideBySide<'a> {
+    /// Identity of the recording.
+    pub id: &'a str,
+    /// Its title.
+    pub title: &'a str,
+    /// Titles and Markdown.
+    pub texts: &'a [(&'a str, String)],
+}
+
+impl SideBySide<'_> {
+    /// Writes everything; it is served, if asked for, until the result is dropped.
+    pub fn write(
+        &self,
+        lanes: &[Lane],
+        differences: &[Difference],
+        sinks: &[Sink],
+    ) -> Result<Finished, RecordError> {
+        let to = Destinations::open(sinks)?;
+        let rec = stream(self.id, to.sinks, !to.viewers.is_empty())?;
+        let pairs: Vec<(&RunInfo, Paths)> =
+            differences.iter().map(|d| (&d.info, difference_paths(&d.info))).collect();
+        let texts: Vec<(&str, EntityPath)> =
+            self.texts.iter().map(|(title, _)| (*title, text_path(title))).collect();
+        let infos: Vec<&RunInfo> = lanes.iter().map(|lane| &lane.info).collect();
+        blueprint::send_comparison(&rec, self.id, &infos, &pairs, &texts)?;
+        rec.send_recording_name(self.title)?;
+        for (title, text) in self.texts {
+            rec.log_static(
+                text_path(title),
+                &archetypes::TextDocument::from_markdown(text.as_str()),
+            )?;
+        }
+
+        let mut all = RerunLog::of(rec.clone(), &RunInfo::default());
+        (all.files, all.viewers, all.page) = (to.files, to.viewers, to.page);
+        for (lane, color) in lanes.iter().zip(OKABE_ITO.iter().cycle()) {
+            let log = RerunLog::of(rec.clone(), &lane.info);
+            for (chunk, path) in lane.recorded.of_run() {
+                // Numbers of fields are for comparing, which is done.
+                if path.last().is_some_and(|part| part == "values") {
+                    continue;
+                }
+                let path = path.into_iter().map(EntityPathPart::new).collect();
+                let path = log.paths.root.join(&EntityPath::new(path));
+                rec.send_chunk(chunk.clone_with_new_entity_path(path));
+            }
+            log.one_color(&lane.info, Some(&lane.info.name), *color)?;
+        }
+        for difference in differences {
+            let mut log = RerunLog::of(rec.clone(), &difference.info);
+            log.paths = difference_paths(&difference.info);
+            log.world(&difference.info)?;
+            for (time, fields) in &difference.frames {
+                rec.reset_time();
+                rec.set_duration_secs(SIM_TIME, *time);
+                fields.iter().try_for_each(|field| log.field(field))?;
+            }
+            if let Some(end) = difference.ends {
+                rec.reset_time();
+                rec.set_duration_secs(SIM_TIME, end + AFTER);
+                for field in &difference.info.fields {
+                    let image = log.paths.field(&field.name).join(&"image".into());
+                    rec.log(image, &archetypes::Clear::flat())?;
+                }
+            }
+        }
+        let pictures = lanes.len() as u64;
+        let finished = all.finish()?;
+        Ok(Finished { pictures, ..finished })
+    }
+}
+
+fn difference_paths(info: &RunInfo) -> Paths {
+    Paths::below(DIFFERENCES, &info.name)
+}
+
+fn text_path(title: &str) -> EntityPath {
+    EntityPath::new(["comparison", title].map(|part| EntityPathPart::new(part.to_owned())).to_vec())
+}
+
+/// What all runs are looked at in.
+pub(super) fn bounds(infos: &[&RunInfo]) -> Rect {
+    let domains = infos.iter().map(|info| info.domain);
+    domains.reduce(Rect::around).unwrap_or_default()
+}
