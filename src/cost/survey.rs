@@ -49,8 +49,8 @@ impl Effort {
     fn limits(self) -> Limits {
         match self {
             Effort::Quick => Limits {
-                base: 1.2,
-                total: 95.0,
+                base: 1.0,
+                total: 105.0,
                 ratio: 1.5,
                 factors: &[0.5, FRAC_1_SQRT_2, 1.0, 1.2],
                 factors_exact: &[0.25, 0.5, FRAC_1_SQRT_2, 1.0, SQRT_2, 2.0],
@@ -75,6 +75,9 @@ const REPEATS: [(f64, usize); 3] = [(0.1, 5), (0.4, 3), (1.0, 2)];
 
 /// Seeds whose spread is the sampling error.
 const SEEDS: [u64; 3] = [11, 12, 13];
+
+/// Fewest steps of a shortened run.
+const LEAST_STEPS: f64 = 6.0;
 
 /// Cells of the coarse meshes that run to the end, relative to the scene's own, and the share of
 /// the time that may be spent on them.
@@ -150,7 +153,7 @@ pub fn price(
     if target.at != Moment::Start && pilot.whole() > limits.base {
         let share = (limits.base - pilot.start) / (pilot.whole() - pilot.start);
         // Fewer steps are all start.
-        let least = 10.0 / pilot.steps.max(10.0);
+        let least = LEAST_STEPS / pilot.steps.max(LEAST_STEPS);
         let (sets, end) = shortened(&scene, share.max(least))?;
         short = source.with_sets(&sets)?;
         horizon = end;
@@ -404,8 +407,7 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// Every knob around the scene's own settings: finer ones first, which tell what is left of the
-    /// error, then cheap ones first.
+    /// Every knob around the scene's own settings: those with sizes, cheap ones first, then choices.
     fn one_by_one(&mut self) -> Result<(), CostError> {
         let base = self.ran[0].sample.took.wall;
         let mut list = vec![];
@@ -413,11 +415,10 @@ impl Survey<'_> {
             for (l, level) in knob.levels.iter().enumerate() {
                 // Cells count to the power two, and once more for the steps.
                 let guess = base * level.size.map_or(1.5, |h| h.powf(-2.5).clamp(0.1, 30.0));
-                let finer = level.size.is_some_and(|h| h < 1.0);
-                list.push((self.design.one(k, l), guess, finer));
+                list.push((self.design.one(k, l), guess, level.size.is_none()));
             }
         }
-        list.sort_by(|a, b| b.2.cmp(&a.2).then(a.1.total_cmp(&b.1)));
+        list.sort_by(|a, b| a.2.cmp(&b.2).then(a.1.total_cmp(&b.1)));
         list.into_iter().try_for_each(|(settings, guess, _)| self.candidate(settings, guess))
     }
 
