@@ -35,6 +35,7 @@
 pub mod cases;
 pub mod commands;
 pub mod cost;
+pub mod explorer;
 pub mod frame;
 pub mod laws;
 pub mod motion;

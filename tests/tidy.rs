@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the house, ground floor first, and what each may import.
-const ROOMS: [(&str, &[&str]); 15] = [
+const ROOMS: [(&str, &[&str]); 16] = [
     ("testing", &[]),
     ("laws", &[]),
     ("frame", &[]),
@@ -19,7 +19,14 @@ const ROOMS: [(&str, &[&str]); 15] = [
     ("cost", &["scene", "space", "plan", "sim", "cases", "testing"]),
     ("record", &["frame", "scene", "space", "plan", "sim"]),
     ("stress", &["scene", "plan", "sim", "cases", "verify", "space"]),
-    ("commands", &["frame", "scene", "plan", "sim", "cases", "verify", "cost", "stress", "record"]),
+    ("explorer", &["frame", "scene", "plan", "sim", "cost", "record", "stress"]),
+    (
+        "commands",
+        &[
+            "frame", "scene", "plan", "sim", "cases", "verify", "cost", "stress", "record",
+            "explorer",
+        ],
+    ),
 ];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {

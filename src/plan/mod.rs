@@ -226,6 +226,15 @@ impl Plan {
         self.state.materials.iter().position(|m| m.background).map(|m| m as u8)
     }
 
+    /// Whether a frame is due at a time (s), given how many were; counts on.
+    pub fn frame_is_due(&self, time: f64, count: &mut usize) -> bool {
+        let now = time / self.units.time * (1.0 + 1e-12);
+        let past = self.clock.frames.iter().take_while(|&&t| t <= now).count();
+        let due = past > *count;
+        *count = past.max(*count);
+        due
+    }
+
     /// SI coordinates of a point.
     pub fn si(&self, p: [f64; 2]) -> [f64; 2] {
         p.map(|c| c * self.units.length)

@@ -18,6 +18,8 @@ mod bar;
 mod blueprint;
 mod race;
 mod sinks;
+mod stage;
+mod viewer;
 
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
@@ -29,6 +31,8 @@ use rerun::{EntityPath, EntityPathPart, RecordingStream};
 
 pub use race::Race;
 pub use sinks::{Saved, Sink};
+pub use stage::Lane;
+pub use viewer::{ViewerFile, viewer_file};
 
 use crate::frame::{
     Frame, GridField, Isoline, ParticleSnapshot, Picture, Quantity, Rect, RunInfo, Scalar,
@@ -201,35 +205,31 @@ impl Served {
 impl RerunLog {
     /// Starts a recording: destinations, layout and all that does not change.
     pub fn open(info: &RunInfo, sinks: &[Sink]) -> Result<Self, RecordError> {
-        let to = Destinations::open(sinks)?;
-        let mut builder = rerun::RecordingStreamBuilder::new(APPLICATION)
-            .recording_id(info.recording_id.as_str())
-            // The RERUN environment variable must not silence a recording that was asked for.
-            .enabled(true);
-        if to.viewers.is_empty() {
-            builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
-                flush_tick: FILE_TICK,
-                ..Default::default()
-            });
-        }
-        let rec = builder.set_sinks(to.sinks)?;
-        rec.set_log_time_enabled(false);
-        rec.set_log_tick_enabled(false);
-
+        let mut to = Destinations::open(sinks)?;
+        let rec = to.begin(&info.recording_id)?;
         blueprint::send(&rec, info, &Paths::new(&info.name))?;
         rec.send_recording_name(info.name.as_str())?;
-        let mut log = Self::of(rec, info);
+        Self::of(rec, info).towards(to, info)
+    }
+
+    /// Attaches destinations, and records all that does not change.
+    fn towards(mut self, to: Destinations, info: &RunInfo) -> Result<Self, RecordError> {
+        let log = &mut self;
         log.files = to.files;
         log.viewers = to.viewers;
         log.page = to.page;
-        log.world(info)?;
-        log.texts(info)?;
-        log.curves(info)?;
+        log.constant(info)?;
         // A viewer that is absent from the start is a mistake in the command; the check forgets it.
         let wanted = log.viewers.clone();
         log.check()?;
         wanted.iter().try_for_each(Live::check)?;
-        Ok(log)
+        Ok(self)
+    }
+
+    fn constant(&mut self, info: &RunInfo) -> Result<(), RecordError> {
+        self.world(info)?;
+        self.texts(info)?;
+        self.curves(info)
     }
 
     /// A run that goes to a stream, without destinations of its own.
@@ -259,7 +259,7 @@ impl RerunLog {
         }
     }
 
-    /// What to open in a browser, if the recording is served.
+    /// What to open in a browser, or in a viewer if only data is streamed.
     pub fn url(&self) -> Option<&str> {
         self.page.as_ref().map(|page| page.url.as_str())
     }

@@ -37,6 +37,12 @@ pub(super) fn send_race(rec: &RecordingStream, infos: &[RunInfo]) -> Result<(), 
     lay_out(rec, id, WALL_TIME, |writer| writer.race(infos))
 }
 
+/// Sends the layout of runs side by side on one time cursor: the flows, and no plots.
+pub(super) fn send_stage(rec: &RecordingStream, infos: &[&RunInfo]) -> Result<(), RecordError> {
+    let id = infos.last().map_or("stage", |info| info.recording_id.as_str());
+    lay_out(rec, id, SIM_TIME, |writer| writer.stage(infos))
+}
+
 fn lay_out(
     rec: &RecordingStream,
     id: &str,
@@ -135,15 +141,48 @@ impl Writer<'_> {
         }
     }
 
+    /// The flow with its fields in tabs beside it; several runs side by side, fields below.
+    fn stage(&mut self, infos: &[&RunInfo]) -> Result<Node, RecordError> {
+        let alone = infos.len() == 1;
+        let mut lanes = vec![];
+        for info in infos {
+            let paths = Paths::new(&info.name);
+            let [width, height] = info.domain.size();
+            let flow = if alone { self.flow(info, &paths)? } else { self.lane(info, &paths)? };
+            let mut fields = self.fields(info, &paths)?;
+            if alone {
+                fields.push(self.text("Plan", &paths.at("plan"))?);
+                fields.push(self.text("Scene", &paths.at("scene"))?);
+                fields.push(self.log(&paths.at("log"))?);
+            }
+            let mut parts = vec![flow];
+            if !fields.is_empty() {
+                parts.push(self.tabs(&fields)?);
+            }
+            let kind = if alone && width < WIDE * height {
+                components::ContainerKind::Horizontal
+            } else {
+                components::ContainerKind::Vertical
+            };
+            let shares = if parts.len() == 2 { vec![1.0, 1.0] } else { vec![] };
+            lanes.push(self.stack(kind, &parts, &shares)?);
+        }
+        self.stack(components::ContainerKind::Horizontal, &lanes, &[])
+    }
+
+    /// The flow of a run among others, under its name.
+    fn lane(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {
+        let flow = ["+ $origin/world/**", "- $origin/world/fields/**"];
+        self.space(&info.name, paths, &flow, bar::seen(info.domain, bar::Room::Large))
+    }
+
     /// A column for each run, their first plot below.
     fn race(&mut self, infos: &[RunInfo]) -> Result<Node, RecordError> {
         let mut lanes = vec![];
         let mut contents = vec![];
         for info in infos {
             let paths = Paths::new(&info.name);
-            let flow = ["+ $origin/world/**", "- $origin/world/fields/**"];
-            let seen = bar::seen(info.domain, bar::Room::Large);
-            let mut lane = vec![self.space(&info.name, &paths, &flow, seen)?];
+            let mut lane = vec![self.lane(info, &paths)?];
             lane.extend(self.fields(info, &paths)?.into_iter().take(1));
             lanes.push(self.stack(components::ContainerKind::Vertical, &lane, &[])?);
             let series = info.plots.iter().take(1).flat_map(|plot| &plot.series);

@@ -5,7 +5,7 @@ use std::path::Path;
 use rerun::archetypes;
 
 use super::sinks::{Destinations, Sink};
-use super::{APPLICATION, Finished, RecordError, RerunLog, blueprint, on_dark, rgb};
+use super::{Finished, RecordError, RerunLog, blueprint, on_dark, rgb};
 use crate::frame::{Frame, RunInfo};
 use crate::record::color::OKABE_ITO;
 
@@ -18,22 +18,15 @@ impl Race {
     /// Starts a recording of runs, which need names of their own; the first one's identity is that
     /// of the recording.
     pub fn open(infos: &[RunInfo], title: &str, path: &Path) -> Result<Self, RecordError> {
-        let to = Destinations::open(&[Sink::Save(path.to_owned())])?;
+        let mut to = Destinations::open(&[Sink::Save(path.to_owned())])?;
         let id = infos.first().map_or("race", |info| info.recording_id.as_str());
-        let rec = rerun::RecordingStreamBuilder::new(APPLICATION)
-            .recording_id(id)
-            .enabled(true)
-            .set_sinks(to.sinks)?;
-        rec.set_log_time_enabled(false);
-        rec.set_log_tick_enabled(false);
+        let rec = to.begin(id)?;
         blueprint::send_race(&rec, infos)?;
         rec.send_recording_name(title)?;
         let mut lanes = Vec::new();
         for (info, color) in infos.iter().zip(OKABE_ITO.iter().cycle()) {
             let mut lane = RerunLog::of(rec.clone(), info);
-            lane.world(info)?;
-            lane.texts(info)?;
-            lane.curves(info)?;
+            lane.constant(info)?;
             for series in info.plots.iter().flat_map(|plot| &plot.series) {
                 // Curves of several runs share a plot: a colour tells the run.
                 lane.rec.log_static(
