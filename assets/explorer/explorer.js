@@ -176,7 +176,8 @@ function renderNumbers(run) {
     ["step", String(run.step), ""],
     ["steps/s", rate === null ? "–" : short(rate, 2), ""],
     ["time", `${short(run.time, 4)} of ${short(run.end, 3)} s`, "wide"],
-    ["time step", `${short(run.dt)} s: ${run.limited_by}`, "wide"],
+    ["time step", `${short(run.dt)} s`, "wide"],
+    ["limited by", run.limited_by, "wide"],
     ...run.readings.map((r) => [r.name, `${short(r.value, 4)} ${r.unit}`, "wide"]),
     ["cells", `${run.cells[0]} × ${run.cells[1]}`, ""],
     ["unknowns", run.unknowns.toLocaleString("en"), ""],
@@ -391,8 +392,8 @@ function renderPlots() {
   const live = state && state.run && curves.get(state.run.id);
   if (!live) return;
   const columns = live.columns.filter((c) => c !== "step" && c !== "time");
-  const first = columns.filter((c) => c.endsWith(" rate") || c.endsWith(" volume") || c === "mean |n_x|");
-  const usual = [...first, "max_speed", "dissipation", "power_error"];
+  const ending = (word) => columns.filter((c) => c.endsWith(word));
+  const usual = [...ending(" rate"), ...ending(" volume"), ...ending("|n_x|"), "max_speed", "dissipation", "power_error"];
   if (changed("plots", columns) || $("plots").children.length === 0) {
     $("plots").replaceChildren(...chosen.map((_, k) => {
       const select = make("select", { ariaLabel: `Curve ${k + 1}` },

@@ -5,12 +5,15 @@ let handle = null;
 let shown = null; // the stream on screen
 let wanted = null; // the stream asked for last
 
+// The viewer tells its console about every shader; browsers keep all of that.
+console.debug = () => {};
+
 async function start() {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
-  await wasm_bindgen("re_viewer_bg.wasm");
+  await wasm_bindgen({ module_or_path: "re_viewer_bg.wasm" });
   const viewer = new wasm_bindgen.WebHandle({
     hide_welcome_screen: true,
-    panel_state_overrides: { top: "hidden", blueprint: "hidden", selection: "hidden" },
+    panel_state_overrides: { top: "Hidden", blueprint: "Hidden", selection: "Hidden" },
     enable_history: false,
     notebook: false,
     persist: false,

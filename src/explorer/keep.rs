@@ -39,7 +39,12 @@ pub fn checked(name: &str) -> Result<&str, KeepError> {
 }
 
 /// Writes a run into a folder of its own below `out`; a taken name gets a number.
-pub fn keep(live: &Live, mode: Mode, out: &Path, name: &str) -> Result<(PathBuf, SavedState), KeepError> {
+pub fn keep(
+    live: &Live,
+    mode: Mode,
+    out: &Path,
+    name: &str,
+) -> Result<(PathBuf, SavedState), KeepError> {
     let folder = folder::create_below(out, checked(name)?)?;
     let at = |name: &str| folder.join(name);
     let write = |name: &str, text: String| {
@@ -101,7 +106,8 @@ mod tests {
         for name in ["a", "silo-2", "my_run", "5"] {
             assert!(checked(name).is_ok(), "{name}");
         }
-        for name in ["", ".", "..", "../a", "a/b", "a\\b", "a b", "C:", "a\0", "ä", &"a".repeat(65)] {
+        for name in ["", ".", "..", "../a", "a/b", "a\\b", "a b", "C:", "a\0", "ä", &"a".repeat(65)]
+        {
             assert!(checked(name).is_err(), "{name}");
         }
     }

@@ -203,7 +203,12 @@ pub fn dial(draft: &Draft, plan: &Plan, own: u32) -> Vec<Stop> {
             let other = draft.with(CELLS, &cells.to_string()).ok()?.plan().ok()?;
             let unknowns = unknowns(&other);
             let error = prices.as_ref().and_then(|list| price(list, cells, own));
-            (unknowns <= MOST_UNKNOWNS).then_some(Stop { cells, unknowns, kind: kind(&other), error })
+            (unknowns <= MOST_UNKNOWNS).then_some(Stop {
+                cells,
+                unknowns,
+                kind: kind(&other),
+                error,
+            })
         })
         .collect()
 }

@@ -41,18 +41,19 @@ impl Problem {
 
     /// Of a run that cannot start or go on.
     pub fn of_run(error: &SimError) -> Problem {
-        let fault = Fault {
-            message: error.to_string(),
-            remedy: Some(error.remedy().into()),
-            line: None,
-        };
+        let fault =
+            Fault { message: error.to_string(), remedy: Some(error.remedy().into()), line: None };
         Problem { title: "The run cannot go on".into(), faults: vec![fault], scene: None }
     }
 
     /// Of anything else.
     pub fn of_machine(message: String) -> Problem {
         let fault = Fault { message, remedy: None, line: None };
-        Problem { title: "Something outside of the run is in the way".into(), faults: vec![fault], scene: None }
+        Problem {
+            title: "Something outside of the run is in the way".into(),
+            faults: vec![fault],
+            scene: None,
+        }
     }
 }
 

@@ -339,7 +339,12 @@ impl Session {
     }
 
     /// Starts a run in place of the present one.
-    fn begin(&mut self, draft: Draft, plan: crate::plan::Plan, mode: Mode) -> Result<(), SceneError> {
+    fn begin(
+        &mut self,
+        draft: Draft,
+        plan: crate::plan::Plan,
+        mode: Mode,
+    ) -> Result<(), SceneError> {
         let id = self.number();
         let live = Live::start(id, draft, plan, &self.board).map_err(|e| {
             self.problem = Some(Problem::of_run(&e));
@@ -495,9 +500,10 @@ impl Session {
 
     fn publish(&mut self) {
         self.published = Some(Instant::now());
-        let (title, description) = self.live.as_ref().map_or(("", ""), |l| {
-            (l.plan.scene.name.as_str(), l.plan.scene.description.as_str())
-        });
+        let (title, description) = self
+            .live
+            .as_ref()
+            .map_or(("", ""), |l| (l.plan.scene.name.as_str(), l.plan.scene.description.as_str()));
         let mut warnings = vec![];
         if let Some(live) = &self.live {
             warnings.extend(live.values.warnings.iter().map(ToString::to_string));
@@ -641,15 +647,9 @@ fn lights(live: &Live) -> Vec<Light> {
         ),
         light(
             "volume error",
-            row.volume_error,
-            CRITERIA.drift,
-            "volume of particles in a cell against its area, root mean square",
-        ),
-        light(
-            "volume drift",
             drift,
             CRITERIA.drift,
-            "change of a material's area since the beginning, the largest",
+            "change of a material's area as the solver sees it since the beginning, the largest",
         ),
         light(
             "corrections",

@@ -195,4 +195,3 @@ fn set_material(m: &mut scene::Material, field: &str, value: &Quantity) -> bool 
     }
     true
 }
-

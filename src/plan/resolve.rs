@@ -8,8 +8,8 @@ use super::units::power_of_two;
 use super::*;
 use crate::laws::{cosserat, granular};
 use crate::scene::{
-    self, BoundaryKind, Direction, Field, GradingTarget, Interesting, Moment, Quantity,
-    SceneError, Scope, Shape, WallKind, closest,
+    self, BoundaryKind, Direction, Field, GradingTarget, Interesting, Moment, Quantity, SceneError,
+    Scope, Shape, WallKind, closest,
 };
 use crate::space::mesh::Axis;
 use crate::space::walls::Obstacle;

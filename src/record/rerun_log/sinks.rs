@@ -278,8 +278,7 @@ impl Destinations {
     fn stream(&mut self) -> Result<(), RecordError> {
         let [port, _] = claim([0, 0])?;
         self.data(port, format!("data on port {port}"))?;
-        self.page =
-            Some(Page { url: format!("rerun+http://{HOST}:{port}/proxy"), _server: None });
+        self.page = Some(Page { url: format!("rerun+http://{HOST}:{port}/proxy"), _server: None });
         Ok(())
     }
 

@@ -16,11 +16,7 @@ pub struct Lane<'a> {
 
 impl RerunLog {
     /// Starts a recording of a run that goes on, beside others that do not.
-    pub fn beside(
-        others: &[Lane],
-        run: &Lane,
-        sinks: &[Sink],
-    ) -> Result<Self, RecordError> {
+    pub fn beside(others: &[Lane], run: &Lane, sinks: &[Sink]) -> Result<Self, RecordError> {
         let mut to = Destinations::open(sinks)?;
         let rec = to.begin(&run.info.recording_id)?;
         let infos: Vec<&RunInfo> = others.iter().chain([run]).map(|lane| lane.info).collect();
