@@ -47,16 +47,36 @@ pub fn request(
     stream.write_all(format!("{head}\r\n").as_bytes()).expect("sent");
     // A server may refuse before it has read everything.
     let _ = stream.write_all(body);
-    let mut bytes = vec![];
-    let _ = stream.read_to_end(&mut bytes);
+    // Not every server closes the connection when asked to.
+    let (mut bytes, mut part) = (vec![], [0; 1 << 16]);
+    while !is_whole(&bytes) {
+        match stream.read(&mut part) {
+            Ok(n) if n > 0 => bytes.extend(&part[..n]),
+            _ => break,
+        }
+    }
     read(&bytes)
 }
 
+fn head_of(bytes: &[u8]) -> Option<(usize, String)> {
+    let end = bytes.windows(4).position(|w| w == b"\r\n\r\n")?;
+    Some((end + 4, String::from_utf8_lossy(&bytes[..end]).into_owned()))
+}
+
+fn is_whole(bytes: &[u8]) -> bool {
+    let Some((from, head)) = head_of(bytes) else { return false };
+    let head = head.to_ascii_lowercase();
+    let length = head.lines().find_map(|l| l.strip_prefix("content-length:")?.trim().parse().ok());
+    match length {
+        Some(length) => bytes.len() - from >= length,
+        None => head.contains("chunked") && bytes.ends_with(b"0\r\n\r\n"),
+    }
+}
+
 fn read(bytes: &[u8]) -> Reply {
-    let end = bytes.windows(4).position(|w| w == b"\r\n\r\n").unwrap_or(bytes.len());
-    let head = String::from_utf8_lossy(&bytes[..end]).into_owned();
+    let (from, head) = head_of(bytes).unwrap_or((bytes.len(), String::new()));
     let code = head.split(' ').nth(1).and_then(|c| c.parse().ok()).unwrap_or(0);
-    let mut body = bytes.get(end + 4..).unwrap_or_default().to_vec();
+    let mut body = bytes[from..].to_vec();
     if head.to_ascii_lowercase().contains("transfer-encoding: chunked") {
         body = joined(&body);
     }

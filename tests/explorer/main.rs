@@ -1,7 +1,9 @@
 //! The explorer as pages meet it: over HTTP, and in a real browser where there is one.
 
 mod api;
+mod browser;
 mod http;
+mod webdriver;
 
 use grainscope::testing::TempFolder;
 use http::Reply;
