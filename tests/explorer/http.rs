@@ -66,7 +66,8 @@ fn head_of(bytes: &[u8]) -> Option<(usize, String)> {
 fn is_whole(bytes: &[u8]) -> bool {
     let Some((from, head)) = head_of(bytes) else { return false };
     let head = head.to_ascii_lowercase();
-    let length = head.lines().find_map(|l| l.strip_prefix("content-length:")?.trim().parse().ok());
+    let length: Option<usize> =
+        head.lines().find_map(|l| l.strip_prefix("content-length:")?.trim().parse().ok());
     match length {
         Some(length) => bytes.len() - from >= length,
         None => head.contains("chunked") && bytes.ends_with(b"0\r\n\r\n"),
