@@ -125,10 +125,30 @@ function render() {
     lastNews = state.news.number;
   }
   showStream();
+  sketch();
 }
 
 function showStream() {
-  if (viewerReady && state && state.stream) $("viewer").contentWindow.show(state.stream);
+  if (viewerReady && state && state.stream) $("viewer").contentWindow.show(state.stream, state.run ? state.run.time : null, state.pins.length > 0);
+}
+
+// --- a sketch, until the viewer shows its first picture ---
+
+let sketching = false;
+let sketched = null;
+async function sketch() {
+  const id = state.run && `${state.run.id} ${state.run.step}`;
+  if (document.body.dataset.showing || sketching || !id || sketched === id) return;
+  sketching = true;
+  try {
+    const response = await fetch("api/sketch");
+    if (response.ok) drawSketch($("sketch"), await response.json());
+    sketched = id;
+  } catch (_) {
+    // The next state tries again.
+  } finally {
+    sketching = false;
+  }
 }
 
 function renderScenes() {
@@ -419,6 +439,7 @@ $("run").onclick = toggle;
 $("step").onclick = () => send({ do: "step" });
 $("restart").onclick = () => send({ do: "restart" });
 $("stop").onclick = () => send({ do: "stop" });
+$("live").onclick = () => { if (viewerReady) $("viewer").contentWindow.goLive(); };
 $("quit").onclick = () => { if (confirm("End grainscope? Runs that are not saved are lost.")) send({ do: "quit" }); };
 $("scene").onchange = async (event) => {
   const answer = await send({ do: "load", scene: event.target.value });
@@ -442,7 +463,7 @@ document.addEventListener("keydown", (event) => {
   if (typing) return;
   // The space bar of a control that has the focus is that control's.
   if (event.key === " " && at.matches("button, input, summary, a")) return;
-  const keys = { " ": $("run"), s: $("step"), r: $("restart"), x: $("stop") };
+  const keys = { " ": $("run"), s: $("step"), r: $("restart"), x: $("stop"), l: $("live") };
   if (keys[event.key]) { event.preventDefault(); keys[event.key].click(); }
   if (event.key === "p") { event.preventDefault(); $("pin").requestSubmit(); }
 });
@@ -450,7 +471,7 @@ document.addEventListener("keydown", (event) => {
 window.addEventListener("message", (event) => {
   if (event.origin !== location.origin || !event.data || !event.data.viewer) return;
   if (event.data.viewer === "ready") { viewerReady = true; showStream(); }
-  if (event.data.viewer === "showing") { $("loading").hidden = true; document.body.dataset.showing = event.data.recording; }
+  if (event.data.viewer === "showing") { $("loading").hidden = $("sketch").hidden = true; document.body.dataset.showing = event.data.recording; }
   if (event.data.viewer === "failed") { $("loading").hidden = false; $("loading").textContent = `The viewer failed: ${event.data.why}`; }
 });
 window.addEventListener("resize", renderPlots);

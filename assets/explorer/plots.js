@@ -92,3 +92,32 @@ function plot(svg, column, runs, changes) {
     svg.append(draw("circle", { cx: X(end[0]), cy: Y(end[1]), r: 2.2, fill: run.color }));
   }
 }
+
+// Grains, dye and walls on a canvas.
+function drawSketch(canvas, picture) {
+  const box = canvas.getBoundingClientRect();
+  const dense = devicePixelRatio || 1;
+  [canvas.width, canvas.height] = [box.width * dense, box.height * dense];
+  const pen = canvas.getContext("2d");
+  const [[x0, y0], [x1, y1]] = picture.domain;
+  const pad = 24 * dense;
+  const scale = Math.min((canvas.width - 2 * pad) / (x1 - x0), (canvas.height - 2 * pad) / (y1 - y0));
+  const X = (x) => canvas.width / 2 + scale * (x - 0.5 * (x0 + x1));
+  const Y = (y) => canvas.height / 2 - scale * (y - 0.5 * (y0 + y1));
+  const style = getComputedStyle(canvas);
+  for (const [[r, g, b], places] of picture.grains) {
+    pen.fillStyle = `rgb(${r} ${g} ${b})`;
+    for (const [x, y] of places) pen.fillRect(X(x) - dense, Y(y) - dense, 2 * dense, 2 * dense);
+  }
+  pen.strokeStyle = style.color;
+  const lines = (list, width) => {
+    pen.lineWidth = width * dense;
+    for (const line of list) {
+      pen.beginPath();
+      line.forEach(([x, y], k) => (k ? pen.lineTo(X(x), Y(y)) : pen.moveTo(X(x), Y(y))));
+      pen.stroke();
+    }
+  };
+  lines(picture.dye, 0.8);
+  lines(picture.walls, 2.5);
+}

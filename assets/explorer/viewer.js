@@ -1,9 +1,15 @@
 // The Rerun viewer, and what the page around it may ask of it.
 "use strict";
 
+const TIMELINE = "sim_time"; // nanoseconds
+
 let handle = null;
 let shown = null; // the stream on screen
 let wanted = null; // the stream asked for last
+let now = null; // seconds that the run has come to
+let beside = false; // whether other runs stand beside it
+let set = null; // where this page has put the time cursor
+let moved = false; // whether somebody else has
 
 // The viewer tells its console about every shader; browsers keep all of that.
 console.debug = () => {};
@@ -32,7 +38,11 @@ function follow() {
     parent.postMessage({ viewer: "failed", why: String(handle.panic_message()) }, location.origin);
     return;
   }
-  if (!wanted || (shown && shown.url === wanted.url)) return;
+  if (!wanted) return;
+  if (shown && shown.url === wanted.url) {
+    if (beside && !moved) keepPace();
+    return;
+  }
   if (wanted.opened !== true) {
     wanted.opened = true;
     handle.add_receiver(wanted.url);
@@ -48,23 +58,44 @@ function follow() {
   }
   if (shown) handle.remove_receiver(shown.url);
   shown = wanted;
+  [set, moved] = [null, false];
   parent.postMessage({ viewer: "showing", recording: shown.recording }, location.origin);
 }
 
-window.show = (stream) => {
+// Keeps the time cursor at the run's own instant, which those beside it may be far ahead of, until
+// somebody moves it.
+function keepPace() {
+  const id = shown.recording;
+  const range = handle.get_timeline_time_range(id, TIMELINE);
+  if (!range || now === null) return;
+  const at = handle.get_time_for_timeline(id, TIMELINE);
+  if (set !== null && at !== undefined && Math.abs(at - set) > 1) {
+    moved = true;
+    return;
+  }
+  const to = Math.min(Math.round(1e9 * now), Number(range.max));
+  if (set === to) return;
+  handle.set_playing(id, false);
+  handle.set_time_for_timeline(id, TIMELINE, to);
+  set = handle.get_time_for_timeline(id, TIMELINE) ?? to;
+}
+
+window.show = (stream, time, others) => {
+  [now, beside] = [time, others];
   if (wanted && wanted.url === stream.url) return;
   if (wanted && wanted.opened && wanted !== shown && handle) handle.remove_receiver(wanted.url);
   wanted = { ...stream };
 };
 
-// Follows the newest instant again after the time cursor was moved.
+// Follows the run again after the time cursor was moved.
 window.goLive = () => {
-  const id = handle && handle.get_active_recording_id();
-  if (!id) return;
-  const line = handle.get_active_timeline(id);
-  const range = line && handle.get_timeline_time_range(id, line);
-  if (range) handle.set_time_for_timeline(id, line, range.max);
-  handle.set_playing(id, true);
+  if (!shown) return;
+  const range = handle.get_timeline_time_range(shown.recording, TIMELINE);
+  if (!range) return;
+  [set, moved] = [null, false];
+  if (beside) return;
+  handle.set_time_for_timeline(shown.recording, TIMELINE, Number(range.max));
+  handle.set_playing(shown.recording, true);
 };
 
 start().catch((e) => parent.postMessage({ viewer: "failed", why: String(e) }, location.origin));

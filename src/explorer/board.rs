@@ -1,6 +1,7 @@
 //! What pages read: the state as JSON, curves, saved files. Written by the session, read by the
 //! server at any time.
 
+use crate::frame::{Frame, RunInfo};
 use crate::plan::Plan;
 use crate::sim::row::Row;
 use serde::Serialize;
@@ -30,6 +31,22 @@ pub struct Board {
     state: watch::Sender<Arc<str>>,
     curves: Mutex<HashMap<u64, Curves>>,
     files: Mutex<HashMap<(String, String), PathBuf>>,
+    sketch: Mutex<Option<(RunInfo, Arc<Frame>)>>,
+}
+
+/// Most points of a sketch.
+const SKETCH_POINTS: usize = 6000;
+
+/// A picture in few lines, for the time until the viewer is there.
+#[derive(Debug, Serialize)]
+pub struct Sketch {
+    pub step: u64,
+    /// Lower left and upper right corner, m.
+    pub domain: [[f32; 2]; 2],
+    pub walls: Vec<Vec<[f32; 2]>>,
+    pub dye: Vec<Vec<[f32; 2]>>,
+    /// Places of particles by material, with its colour.
+    pub grains: Vec<([u8; 3], Vec<[f32; 2]>)>,
 }
 
 impl Board {
@@ -38,6 +55,7 @@ impl Board {
             state: watch::Sender::new("null".into()),
             curves: Mutex::default(),
             files: Mutex::default(),
+            sketch: Mutex::default(),
         }
     }
 
@@ -78,6 +96,33 @@ impl Board {
 
     pub fn forget(&self, run: u64) {
         lock(&self.curves).remove(&run);
+    }
+
+    /// Keeps the last picture to make a sketch of.
+    pub fn sketch(&self, info: &RunInfo, frame: Arc<Frame>) {
+        *lock(&self.sketch) = Some((info.clone(), frame));
+    }
+
+    /// A sketch of the last picture.
+    pub fn drawn(&self) -> Option<Sketch> {
+        let (info, frame) = lock(&self.sketch).clone()?;
+        let picture = frame.picture.as_ref()?;
+        let particles = &picture.particles;
+        let every = particles.positions.len().div_ceil(SKETCH_POINTS).max(1);
+        let mut grains: Vec<_> = info.materials.iter().map(|m| (m.rgb, vec![])).collect();
+        let both = particles.positions.iter().zip(&particles.class).step_by(every);
+        for (place, class) in both {
+            if let Some((_, places)) = grains.get_mut(usize::from(*class)) {
+                places.push(*place);
+            }
+        }
+        Some(Sketch {
+            step: frame.step,
+            domain: [info.domain.min, info.domain.max],
+            walls: info.walls.into_iter().map(|w| w.points).collect(),
+            dye: picture.dye_lines.clone(),
+            grains,
+        })
     }
 
     /// Lets pages fetch a file under a folder's name and its own.

@@ -195,15 +195,24 @@ impl Live {
         (self.ends.len() > 1 && span > 0.0).then(|| (self.ends.len() - 1) as f64 / span)
     }
 
-    /// Mean seconds of the last steps, all in all and by phase.
-    pub fn mean_step(&self) -> (f64, Phases) {
-        // Row 0 sets everything up.
+    /// The last steps; row 0 sets everything up and counts only while it is alone.
+    fn last(&self) -> &[Row] {
         let from = self.rows.len().saturating_sub(MEAN_OVER).max(1);
-        let last = self.rows.get(from..).filter(|r| !r.is_empty()).unwrap_or(&self.rows);
+        self.rows.get(from..).filter(|r| !r.is_empty()).unwrap_or(&self.rows)
+    }
+
+    /// Seconds by phase of the last steps, all together.
+    pub fn phases(&self) -> Phases {
         let mut sum = Phases::default();
-        last.iter().for_each(|r| sum.add(&r.seconds));
-        let n = last.len().max(1) as f64;
-        (last.iter().map(|r| r.wall).sum::<f64>() / n, sum)
+        self.last().iter().for_each(|r| sum.add(&r.seconds));
+        sum
+    }
+
+    /// Seconds that a step takes: the median of the last ones.
+    pub fn usual_step(&self) -> f64 {
+        let mut walls: Vec<f64> = self.last().iter().map(|r| r.wall).collect();
+        walls.sort_by(f64::total_cmp);
+        walls.get(walls.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
     pub fn seconds(&self) -> f64 {

@@ -24,6 +24,7 @@ mod server;
 mod session;
 mod stage;
 
+use crate::record::rerun_log::{ViewerFile, viewer_file};
 use crate::scene::SceneSource;
 use board::Board;
 use crossbeam::channel::bounded;
@@ -80,6 +81,9 @@ pub struct Explorer {
 impl Explorer {
     /// Starts the session and serves its page.
     pub fn open(settings: Settings) -> Result<Explorer, ExplorerError> {
+        if viewer_file(ViewerFile::Program).is_none() {
+            return Err(ExplorerError::NoViewer);
+        }
         let port = settings.port;
         let fault = |source| ExplorerError::Port { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(fault)?;

@@ -122,6 +122,7 @@ fn routes(site: Arc<Site>) -> Router {
         .route("/api/state", get(state))
         .route("/api/events", get(events))
         .route("/api/curves", get(curves))
+        .route("/api/sketch", get(sketch))
         .route("/api/command", post(command))
         .route("/api/saved/{folder}/{file}", get(saved));
     // A router inside another does not match its own root with a slash at the end.
@@ -212,6 +213,13 @@ async fn curves(State(site): Shared, uri: Uri) -> Response {
     match part.map(|p| serde_json::to_string(&p)) {
         Some(Ok(text)) => json(text),
         _ => (StatusCode::NOT_FOUND, "there is no such run\n").into_response(),
+    }
+}
+
+async fn sketch(State(site): Shared) -> Response {
+    match site.board.drawn().map(|s| serde_json::to_string(&s)) {
+        Some(Ok(text)) => json(text),
+        _ => (StatusCode::NOT_FOUND, "there is no picture yet\n").into_response(),
     }
 }
 

@@ -258,6 +258,9 @@ impl Session {
     }
 
     fn show(&mut self, frame: &Arc<Frame>) {
+        if let Some(live) = self.live.as_ref().filter(|_| frame.picture.is_some()) {
+            self.board.sketch(&live.info, frame.clone());
+        }
         if self.stage.as_mut().is_some_and(|stage| !stage.show(frame)) {
             self.set_stage();
         }
@@ -290,7 +293,7 @@ impl Session {
         if let Some(live) = &self.live
             && live.rows.len() > SETTLED
         {
-            self.measured.insert(knobs::kind(&live.plan), live.mean_step().0);
+            self.measured.insert(knobs::kind(&live.plan), live.usual_step());
         }
     }
 
@@ -326,9 +329,6 @@ impl Session {
             Err(e) => {
                 let problem = Problem::of_scene(source.name(), &e, &source);
                 self.problem = Some(Problem { scene: Some(id.into()), ..problem });
-                if self.mode == Mode::Running {
-                    self.stand(Mode::Paused);
-                }
                 return Err(e.with_source(&source));
             }
         };
@@ -356,7 +356,8 @@ impl Session {
             self.board.forget(old.id);
         }
         let Some(live) = &mut self.live else { return Ok(()) };
-        live.observe(true, &self.board);
+        let frame = live.observe(true, &self.board);
+        self.board.sketch(&live.info, frame);
         // The page shows the first picture before the knobs are looked into.
         self.knobs.clear();
         self.switches.clear();
@@ -547,7 +548,7 @@ impl Session {
                 )
             }
             (_, Some(live)) if s.unknowns[0] > s.unknowns[1] => {
-                let (_, phases) = live.mean_step();
+                let phases = live.phases();
                 let solver = phases.assemble + phases.factor + phases.solve;
                 let less = (s.unknowns[1] as f64 / s.unknowns[0] as f64).powf(SOLVER_GROWTH);
                 // Of a step with the effect, whichever is running.
@@ -566,7 +567,7 @@ impl Session {
         let guess = || {
             let live = live.filter(|l| l.rows.len() > 1)?;
             let ratio = s.unknowns as f64 / knobs::unknowns(&live.plan) as f64;
-            Some(live.mean_step().0 * ratio.powf(STEP_GROWTH))
+            Some(live.usual_step() * ratio.powf(STEP_GROWTH))
         };
         DialState {
             cells: s.cells,
@@ -585,7 +586,7 @@ fn milliseconds(seconds: f64) -> String {
 fn run_state(live: &Live) -> RunState {
     let row = live.run.row();
     let plan = &live.plan;
-    let (seconds, sum) = live.mean_step();
+    let sum = live.phases();
     let total = sum.total().max(f64::MIN_POSITIVE);
     let mut readings: Vec<Reading> = vec![];
     for (gauge, now) in plan.gauges.iter().zip(&row.gauges) {
@@ -607,7 +608,7 @@ fn run_state(live: &Live) -> RunState {
         limiter: row.dt_limiter.name(),
         limited_by: limited_by(row.dt_limiter),
         steps_per_second: live.steps_per_second(),
-        seconds_per_step: seconds,
+        seconds_per_step: live.usual_step(),
         particles: row.particles,
         cells: [plan.mesh.x.cells(), plan.mesh.y.cells()],
         unknowns: knobs::unknowns(plan),

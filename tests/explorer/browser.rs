@@ -40,6 +40,8 @@ fn a_newcomer_in_five_minutes() {
     browser.go(&explorer.url);
 
     // The flow is drawn, and the silo discharges.
+    // A sketch at first, then the viewer.
+    browser.wait_for("sketch", "sketched !== null || document.body.dataset.showing");
     browser.wait_for("third step", &format!("{STEP} >= 3"));
     viewer_shows(&browser);
     let clock = std::time::Instant::now();

@@ -28,25 +28,29 @@ pub(super) fn send(
     info: &RunInfo,
     paths: &Paths,
 ) -> Result<(), RecordError> {
-    lay_out(rec, &info.recording_id, SIM_TIME, |writer| writer.run(info, paths))
+    lay_out(rec, &info.recording_id, SIM_TIME, 0, |writer| writer.run(info, paths))
 }
 
 /// Sends the layout of runs side by side, on the timeline of seconds computed.
 pub(super) fn send_race(rec: &RecordingStream, infos: &[RunInfo]) -> Result<(), RecordError> {
     let id = infos.first().map_or("race", |info| info.recording_id.as_str());
-    lay_out(rec, id, WALL_TIME, |writer| writer.race(infos))
+    lay_out(rec, id, WALL_TIME, 0, |writer| writer.race(infos))
 }
 
 /// Sends the layout of runs side by side on one time cursor: the flows, and no plots.
 pub(super) fn send_stage(rec: &RecordingStream, infos: &[&RunInfo]) -> Result<(), RecordError> {
     let id = infos.last().map_or("stage", |info| info.recording_id.as_str());
-    lay_out(rec, id, SIM_TIME, |writer| writer.stage(infos))
+    // Layouts that follow each other in one viewer must not share identifiers: it would take a view
+    // for another one of the same name.
+    let first = id.bytes().fold(0_u64, |all, b| all.wrapping_mul(31).wrapping_add(u64::from(b)));
+    lay_out(rec, id, SIM_TIME, first << 16, |writer| writer.stage(infos))
 }
 
 fn lay_out(
     rec: &RecordingStream,
     id: &str,
     timeline: &str,
+    first: u64,
     write: impl FnOnce(&mut Writer) -> Result<Node, RecordError>,
 ) -> Result<(), RecordError> {
     let (layout, storage) = rerun::RecordingStreamBuilder::new(APPLICATION)
@@ -58,7 +62,7 @@ fn lay_out(
     layout.set_log_tick_enabled(false);
     layout.set_time_sequence("blueprint", 0);
 
-    let mut writer = Writer { rec: &layout, count: 0 };
+    let mut writer = Writer { rec: &layout, count: first };
     let root = write(&mut writer)?;
     layout.log(
         "viewport",
