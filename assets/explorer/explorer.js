@@ -365,7 +365,8 @@ function renderDial() {
   if (focused) { const again = dial.querySelector(":checked"); if (again) again.focus(); }
 }
 
-function color(k) { return COLORS[k % COLORS.length]; }
+// Of the run itself, then of pins.
+function color(k) { return k === 0 ? "var(--accent)" : COLORS[k % COLORS.length]; }
 
 function renderPins() {
   if (!changed("pins", [state.pins, state.run && state.run.id])) return;

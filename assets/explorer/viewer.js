@@ -8,8 +8,9 @@ let shown = null; // the stream on screen
 let wanted = null; // the stream asked for last
 let now = null; // seconds that the run has come to
 let beside = false; // whether other runs stand beside it
-let set = null; // where this page has put the time cursor
-let moved = false; // whether somebody else has
+const set = new Set(); // where this page has put the time cursor
+let arrived = false; // whether it has been there
+let moved = false; // whether somebody else has moved it since
 
 // The viewer tells its console about every shader; browsers keep all of that.
 console.debug = () => {};
@@ -58,7 +59,7 @@ function follow() {
   }
   if (shown) handle.remove_receiver(shown.url);
   shown = wanted;
-  [set, moved] = [null, false];
+  takeOver();
   parent.postMessage({ viewer: "showing", recording: shown.recording }, location.origin);
 }
 
@@ -68,16 +69,20 @@ function keepPace() {
   const id = shown.recording;
   const range = handle.get_timeline_time_range(id, TIMELINE);
   if (!range || now === null) return;
-  const at = handle.get_time_for_timeline(id, TIMELINE);
-  if (set !== null && at !== undefined && Math.abs(at - set) > 1) {
-    moved = true;
-    return;
-  }
+  const at = Math.round(handle.get_time_for_timeline(id, TIMELINE) ?? -1);
+  if (set.has(at)) arrived = true;
+  else if (arrived) moved = true;
   const to = Math.min(Math.round(1e9 * now), Number(range.max));
-  if (set === to) return;
+  if (moved || set.has(to)) return;
+  // What is set shows with one of the next pictures.
+  set.add(to);
   handle.set_playing(id, false);
   handle.set_time_for_timeline(id, TIMELINE, to);
-  set = handle.get_time_for_timeline(id, TIMELINE) ?? to;
+}
+
+function takeOver() {
+  [arrived, moved] = [false, false];
+  set.clear();
 }
 
 window.show = (stream, time, others) => {
@@ -92,7 +97,7 @@ window.goLive = () => {
   if (!shown) return;
   const range = handle.get_timeline_time_range(shown.recording, TIMELINE);
   if (!range) return;
-  [set, moved] = [null, false];
+  takeOver();
   if (beside) return;
   handle.set_time_for_timeline(shown.recording, TIMELINE, Number(range.max));
   handle.set_playing(shown.recording, true);

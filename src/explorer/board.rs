@@ -35,7 +35,7 @@ pub struct Board {
 }
 
 /// Most points of a sketch.
-const SKETCH_POINTS: usize = 6000;
+const SKETCH_POINTS: usize = 20_000;
 
 /// A picture in few lines, for the time until the viewer is there.
 #[derive(Debug, Serialize)]

@@ -664,11 +664,11 @@ fn lights(live: &Live) -> Vec<Light> {
 fn limited_by(limiter: Limiter) -> &'static str {
     match limiter {
         Limiter::Start => "no step was taken yet",
-        Limiter::Courant => "cells crossed (time.courant)",
-        Limiter::Strain => "strain of layers (time.strain)",
+        Limiter::Courant => "cells crossed per step",
+        Limiter::Strain => "strain of the layers",
         Limiter::MaxStep => "time.max_step",
-        Limiter::Relaxation => "relaxation of the stratification",
-        Limiter::Growth => "growth from the step before",
-        Limiter::Stop => "a frame, a change or the end to be met",
+        Limiter::Relaxation => "relaxation of the strata",
+        Limiter::Growth => "growth of the step",
+        Limiter::Stop => "the next frame or change",
     }
 }
