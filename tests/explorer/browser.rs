@@ -5,7 +5,8 @@ use super::webdriver::{Browser, ENTER, RIGHT, TAB};
 use serde_json::json;
 use std::path::Path;
 
-const SMALL: [&str; 3] = ["silo", "--set", "accuracy.cells=2"];
+/// Long enough for browsers that draw without a graphics card.
+const SMALL: [&str; 5] = ["silo", "--set", "accuracy.cells=2", "--set", "time.end=1"];
 /// The grains, and the paper they are drawn on.
 const GRAINS: [u8; 3] = [230, 159, 0];
 const STEP: &str = "Number(document.querySelector('#numbers dd').textContent)";
@@ -43,6 +44,12 @@ fn a_newcomer_in_five_minutes() {
     // A sketch at first, then the viewer.
     browser.wait_for("sketch", "sketched !== null || document.body.dataset.showing");
     browser.wait_for("third step", &format!("{STEP} >= 3"));
+    browser.wait_for("curves", "document.querySelectorAll('#plots path.curve').length === 3");
+
+    // The keyboard: stand, one step.
+    browser.script("document.activeElement.blur()", &[]);
+    browser.press(" ");
+    browser.wait_for("pause", "state.mode === 'paused'");
     viewer_shows(&browser);
     let clock = std::time::Instant::now();
     loop {
@@ -52,16 +59,6 @@ fn a_newcomer_in_five_minutes() {
         }
         assert!(clock.elapsed() < super::PATIENCE, "{colours} colours, {shares:?} grains");
     }
-    assert!(
-        browser.script("return document.querySelectorAll('#plots path.curve').length", &[])
-            == json!(3)
-    );
-
-    // The keyboard: stand, one step.
-    browser.find("body").click();
-    browser.script("document.activeElement.blur()", &[]);
-    browser.press(" ");
-    browser.wait_for("pause", "state.mode === 'paused'");
     let step = browser.script(&format!("return {STEP}"), &[]).as_u64().expect("a number");
     browser.press("s");
     browser.wait_for("step", &format!("{STEP} === {}", step + 1));
