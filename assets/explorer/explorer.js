@@ -356,7 +356,7 @@ function renderDial() {
       make("span", {}, d.seconds_per_step === null ? "–" : `${d.current ? "" : "≈ "}${seconds(d.seconds_per_step)} a step`),
       make("span", {}, last));
   });
-  const heads = make("div", { className: "heads" }, make("span"), make("span"), make("span"), make("span", {}, priced ? "error" : "unknowns"));
+  const heads = make("div", { className: "heads" }, make("span"), make("span", { title: "per domain.length_scale" }, "per length"), make("span"), make("span", {}, priced ? "error" : "unknowns"));
   const dial = make("fieldset", { className: "dial", ariaLabel: "Cells per length, coarse to fine; another choice restarts" }, heads, ...lines);
   $("dial").replaceChildren(dial);
   if (!priced && state.dial.length) {
@@ -399,7 +399,7 @@ function renderWarnings() {
 
 // --- curves ---
 
-const chosen = [null, null, null];
+const chosen = [null, null, null]; // by the user; else what is usual for the scene
 const WORDS = { dt: "time step (s)", power_error: "power balance", volume_error: "volume error", max_speed: "largest speed (m/s)", dissipation: "dissipation (W/m)" };
 
 function title(column) {
@@ -416,11 +416,10 @@ function renderPlots() {
   const ending = (word) => columns.filter((c) => c.endsWith(word));
   const usual = [...ending(" rate"), ...ending(" volume"), ...ending("|n_x|"), "max_speed", "dissipation", "power_error"];
   if (changed("plots", columns) || $("plots").children.length === 0) {
-    $("plots").replaceChildren(...chosen.map((_, k) => {
+    $("plots").replaceChildren(...chosen.map((wish, k) => {
       const select = make("select", { ariaLabel: `Curve ${k + 1}` },
         ...columns.map((c) => make("option", { value: c }, title(c))));
-      chosen[k] = columns.includes(chosen[k]) ? chosen[k] : usual[k];
-      select.value = chosen[k];
+      select.value = columns.includes(wish) ? wish : usual[k];
       select.onchange = () => { chosen[k] = select.value; renderPlots(); };
       const svg = draw("svg", { role: "img" });
       return make("div", { className: "plot" }, select, svg);
@@ -430,7 +429,7 @@ function renderPlots() {
     .filter((r) => r.curves);
   runs.push({ name: "this run", color: color(0), width: 1.8, curves: live });
   const changes = state.run.changes.map((c) => c.time);
-  [...$("plots").children].forEach((part, k) => plot(part.lastChild, chosen[k], runs, changes));
+  [...$("plots").children].forEach((part) => plot(part.lastChild, part.firstChild.value, runs, changes));
 }
 
 // --- what the user does ---

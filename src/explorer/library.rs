@@ -107,7 +107,10 @@ impl Library {
         }
         // Only what the folder itself lists: no name reaches outside of it.
         let name = files(&self.folder).into_iter().find(|name| file_id(name) == id);
-        scene::load(self.folder.join(name.ok_or_else(unknown)?))
+        let name = name.ok_or_else(unknown)?;
+        // Messages name the file as the user would.
+        let here = self.folder == Path::new(".");
+        scene::load(if here { PathBuf::from(name) } else { self.folder.join(name) })
     }
 }
 

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Pictures come no closer together than this while running.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
+const PICTURE_EVERY: Duration = Duration::from_millis(150);
 /// Drawing takes at most this share of the time.
 const PICTURE_SHARE: f64 = 0.2;
 /// Steps that means are taken over.

@@ -32,7 +32,7 @@ impl Problem {
         let error = error.clone().with_source(source);
         let all = std::iter::once(&error).chain(error.others());
         let faults = all.map(|e| Fault {
-            message: e.one_line(),
+            message: e.headline(),
             remedy: e.remedy().map(String::from),
             line: e.span().and_then(|span| line_at(source.text(), span.start)),
         });

@@ -306,7 +306,7 @@ impl Session {
         self.library.look();
         let mode = self.mode_of_next();
         let refused = |e: &SceneError| {
-            Answer::no(e.one_line(), e.remedy().unwrap_or("see what is wrong with it above"))
+            Answer::no(e.headline(), e.remedy().unwrap_or("see what is wrong with it above"))
         };
         match self.library.find(scene) {
             Ok(source) => match self.begin_scene(scene, source.clone(), mode) {
@@ -392,7 +392,7 @@ impl Session {
         let begun = draft.plan().and_then(|plan| self.begin(draft, plan, mode));
         match begun {
             Ok(()) => Answer::yes(format!("restarted: {why}")).restarting(),
-            Err(e) => Answer::no(e.one_line(), e.remedy().unwrap_or_default()),
+            Err(e) => Answer::no(e.headline(), e.remedy().unwrap_or_default()),
         }
     }
 
@@ -415,7 +415,7 @@ impl Session {
                 let mode = self.mode_of_next();
                 match self.begin(draft, values, mode) {
                     Ok(()) => Answer::yes(format!("{said}; restarted: {why}")).restarting(),
-                    Err(e) => Answer::no(e.one_line(), e.remedy().unwrap_or_default()),
+                    Err(e) => Answer::no(e.headline(), e.remedy().unwrap_or_default()),
                 }
             }
         }

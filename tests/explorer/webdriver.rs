@@ -80,6 +80,9 @@ impl Browser {
             return skipped(&format!("no browser can be started: {}", reply.text()));
         };
         let browser = Browser { driver, port, session, _profile: profile };
+        // Drawing without a graphics card holds scripts up.
+        let most = PATIENCE.as_millis() as u64;
+        browser.command("POST", "/timeouts", json!({ "script": most, "pageLoad": most }));
         // The window's frame takes room, the page is to have all that was asked for.
         let size = browser.script("return [innerWidth, innerHeight]", &[]);
         let lack = |k: usize, wanted: u32| {
