@@ -463,13 +463,19 @@ document.addEventListener("keydown", (event) => {
   if (typing) return;
   // The space bar of a control that has the focus is that control's.
   if (event.key === " " && at.matches("button, input, summary, a")) return;
-  const keys = { " ": $("run"), s: $("step"), r: $("restart"), x: $("stop"), l: $("live") };
-  if (keys[event.key]) { event.preventDefault(); keys[event.key].click(); }
-  if (event.key === "p") { event.preventDefault(); $("pin").requestSubmit(); }
+  if (press(event.key)) event.preventDefault();
 });
+
+function press(key) {
+  const keys = { " ": $("run"), s: $("step"), r: $("restart"), x: $("stop"), l: $("live") };
+  if (key === "p") $("pin").requestSubmit();
+  else if (keys[key]) keys[key].click();
+  return key === "p" || key in keys;
+}
 
 window.addEventListener("message", (event) => {
   if (event.origin !== location.origin || !event.data || !event.data.viewer) return;
+  if (event.data.viewer === "key") press(event.data.key);
   if (event.data.viewer === "ready") { viewerReady = true; showStream(); }
   if (event.data.viewer === "showing") { $("loading").hidden = $("sketch").hidden = true; document.body.dataset.showing = event.data.recording; }
   if (event.data.viewer === "failed") { $("loading").hidden = false; $("loading").textContent = `The viewer failed: ${event.data.why}`; }

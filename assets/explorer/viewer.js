@@ -15,6 +15,20 @@ let moved = false; // whether somebody else has moved it since
 // The viewer tells its console about every shader; browsers keep all of that.
 console.debug = () => {};
 
+// The viewer takes the focus when it starts; it is to have it when somebody clicks into it.
+const focus = HTMLElement.prototype.focus;
+HTMLElement.prototype.focus = function (...options) {
+  if (document.hasFocus()) focus.apply(this, options);
+};
+
+// And the keys of the page around it work there too.
+window.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || !" srxpl".includes(event.key)) return;
+  event.stopImmediatePropagation();
+  event.preventDefault();
+  parent.postMessage({ viewer: "key", key: event.key }, location.origin);
+}, true);
+
 async function start() {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
   await wasm_bindgen({ module_or_path: "re_viewer_bg.wasm" });

@@ -153,7 +153,11 @@ impl Browser {
             if value != json!(false) && !value.is_null() {
                 return value;
             }
-            assert!(clock.elapsed() < PATIENCE, "no {what}: {condition}\n{}", self.text("body"));
+            if clock.elapsed() > PATIENCE {
+                let focus =
+                    self.script("return document.activeElement.outerHTML.slice(0, 80)", &[]);
+                panic!("no {what}: {condition}; focus on {focus}\n{}", self.text("main"));
+            }
             std::thread::sleep(Duration::from_millis(100));
         }
     }
