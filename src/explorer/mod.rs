@@ -6,9 +6,9 @@
 //!  |<-------- state -------+<------- board ---------+            +--> viewer (recording)
 //! ```
 //!
-//! The [`session`] owns the run and everything that can be said of it, on a thread of its own. It
+//! The `session` owns the run and everything that can be said of it, on a thread of its own. It
 //! takes commands between steps and answers each one: accepted, with what it does, or refused, and
-//! why. What it knows is written on the [`board`], which the [`server`] reads whenever a page asks,
+//! why. What it knows is written on the `board`, which the `server` reads whenever a page asks,
 //! however long a step takes. Pages hold no state: all that are open show the same session.
 
 mod board;
