@@ -10,6 +10,7 @@
 //!   source, as functions of small matrices.
 //! - [`record`] writes recordings, tables and plots; [`cases`] are scenes with exact solutions,
 //!   [`verify`] measures them, and [`cost`] says what accuracy costs.
+//! - [`explorer`] is a run that listens, and a page that shows it.
 //!
 //! ```
 //! use grainscope::{plan, scene, sim};
