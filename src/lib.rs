@@ -10,6 +10,7 @@
 //!   source, as functions of small matrices.
 //! - [`record`] writes recordings, tables and plots, and [`compare`] reads them back; [`cases`] are
 //!   scenes with exact solutions, [`verify`] measures them, and [`cost`] says what accuracy costs.
+//! - [`explorer`] is a run that listens, and a page that shows it.
 //!
 //! ```
 //! use grainscope::{plan, scene, sim};
@@ -36,6 +37,7 @@ pub mod cases;
 pub mod commands;
 pub mod compare;
 pub mod cost;
+pub mod explorer;
 pub mod frame;
 pub mod laws;
 pub mod motion;

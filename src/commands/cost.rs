@@ -90,7 +90,7 @@ fn file(source: &SceneSource, effort: Effort) -> Result<Option<PathBuf>, Failure
 }
 
 fn kept(source: &SceneSource, effort: Effort) -> Result<Option<List>, Failure> {
-    Ok(file(source, effort)?.and_then(|path| list::load(&path)))
+    Ok(list::kept(&parse(source)?, effort == Effort::Quick))
 }
 
 /// Makes a list and keeps it.

@@ -4,6 +4,7 @@ mod check;
 mod compare;
 mod cost;
 mod cost_page;
+mod explore;
 mod figure;
 mod plan;
 mod presets;
@@ -69,6 +70,8 @@ struct Cli {
 enum Command {
     /// Run a scene: a preset's name or a TOML file
     Run(run::Args),
+    /// Turn the knobs while it flows, in a page of your browser
+    Explore(explore::Args),
     /// Say which effects a scene calls for, and what they cost
     Plan(plan::Args),
     /// Validate a scene and do nothing else
@@ -177,6 +180,7 @@ impl Failure {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
+        Command::Explore(args) => explore::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Presets(args) => presets::run(&args),
@@ -222,10 +226,15 @@ fn print(text: &str) -> Result<(), Failure> {
 
 /// Finds a scene by preset name or path, and applies `--set`s.
 fn source(name: &str, sets: &[String]) -> Result<SceneSource, Failure> {
+    Ok(find(name)?.0.with_sets(sets)?)
+}
+
+/// Finds a scene by preset name or path; whether it is a file.
+fn find(name: &str) -> Result<(SceneSource, bool), Failure> {
     let path = Path::new(name);
     let is_path = path.extension().is_some() || name.contains(['/', '\\']) || path.is_file();
     let source = if is_path { scene::load(path)? } else { scene::presets::find(name)? };
-    Ok(source.with_sets(sets)?)
+    Ok((source, is_path))
 }
 
 /// The scene of a source and its plan, errors pointing into the source.

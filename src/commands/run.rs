@@ -4,15 +4,15 @@ use super::purchase::{self, Bought};
 use super::{Failure, print};
 use crate::frame::Frame;
 use crate::plan::Plan;
-use crate::record::logger::{Backpressure, Logger, Traffic};
-use crate::record::plots::{Axis, Curve, PlotSpec, line_plot, panels_plot};
+use crate::record::logger::{Backpressure, Logger};
 use crate::record::rerun_log::{RerunLog, Served, Sink};
+use crate::record::run_plots::plots_of_run;
 use crate::record::series::SeriesWriter;
 use crate::record::summary::{Ending, Summary, Tally};
 use crate::record::text::duration;
 use crate::record::{folder, info};
 use crate::scene::{Quantity, Scene, SceneSource, Scope, to_toml};
-use crate::sim::row::{Phases, Row};
+use crate::sim::row::Row;
 use crate::sim::{self, Run, SimError, picture};
 use crossbeam::channel::bounded;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -238,16 +238,7 @@ impl Session {
         let series_file = folder.join("series.csv");
         let series =
             SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
-        let tally = Tally {
-            phases: Phases::default(),
-            wall: 0.0,
-            largest_power_error: 0.0,
-            largest_divergence: 0.0,
-            first_energy: run.row().potential_energy,
-            traffic: Traffic::default(),
-            logger_seconds: 0.0,
-            warnings,
-        };
+        let tally = Tally::new(run.row(), warnings);
         Ok(Session {
             plan: plan.clone(),
             run,
@@ -347,16 +338,9 @@ impl Session {
                 self.folder.join("series.csv").display()
             ))
         })?;
-        self.tally.phases.add(&row.seconds);
-        self.tally.largest_power_error = self.tally.largest_power_error.max(row.power_error);
-        self.tally.largest_divergence = self.tally.largest_divergence.max(row.divergence_error);
+        self.tally.add(&row);
         if let Some(logger) = &mut self.logger {
-            let frames = &self.plan.clock.frames;
-            let time = row.time / self.plan.units.time;
-            let due = frames.get(self.next_frame).is_some_and(|&t| t <= time * (1.0 + 1e-12));
-            while frames.get(self.next_frame).is_some_and(|&t| t <= time * (1.0 + 1e-12)) {
-                self.next_frame += 1;
-            }
+            let due = self.plan.frame_is_due(row.time, &mut self.next_frame);
             if row.step == 0 {
                 notes.extend(self.tally.warnings.iter().cloned());
             }
@@ -442,66 +426,8 @@ impl Session {
         let path = self.folder.join("summary.json");
         std::fs::write(&path, format!("{json}\n"))
             .map_err(|e| Failure::Environment(format!("cannot write {}: {e}", path.display())))?;
-        let plotted = self.plot();
+        let plotted = plots_of_run(&self.folder, &self.plan, &self.rows).map_err(Failure::from);
         Ok(Ended { summary, json, recorded, served, failure, plotted })
-    }
-
-    fn plot(&self) -> Result<(), Failure> {
-        let time = || Axis::new("time", "s");
-        let curve = |name: &str, value: &dyn Fn(&Row) -> f64| Curve {
-            name: name.into(),
-            points: self.rows.iter().map(|r| (r.time, value(r))).collect(),
-            marks: false,
-        };
-        let title = &self.plan.scene.name;
-        let gauges = &self.plan.gauges;
-        if !gauges.is_empty() {
-            let of = |value: &dyn Fn(&Row, usize) -> f64| -> Vec<Curve> {
-                (0..gauges.len()).map(|k| curve(&gauges[k].name, &|r| value(r, k))).collect()
-            };
-            panels_plot(
-                &self.folder.join("outflow"),
-                &[
-                    PlotSpec {
-                        title: format!("{title}: volume that has flowed out"),
-                        x: time(),
-                        y: Axis::new("outflow volume", "m²"),
-                        curves: of(&|r, k| r.gauges[k].volume),
-                    },
-                    PlotSpec {
-                        title: "rate of outflow".into(),
-                        x: time(),
-                        y: Axis::new("outflow rate", "m²/s"),
-                        curves: of(&|r, k| r.gauges[k].rate),
-                    },
-                ],
-            )?;
-        }
-        if self.plan.effects.directors {
-            line_plot(
-                &self.folder.join("alignment"),
-                &PlotSpec {
-                    title: format!("{title}: alignment of the directors"),
-                    x: time(),
-                    y: Axis::new("mean |n_x|", ""),
-                    curves: vec![curve("mean |n_x|", &|r| r.alignment.unwrap_or(f64::NAN))],
-                },
-            )?;
-        }
-        line_plot(
-            &self.folder.join("diagnostics"),
-            &PlotSpec {
-                title: format!("{title}: balances"),
-                x: time(),
-                y: Axis::new("relative error", "").log(),
-                curves: vec![
-                    curve("power", &|r| r.power_error),
-                    curve("divergence", &|r| r.divergence_error),
-                    curve("volume", &|r| r.volume_error),
-                ],
-            },
-        )?;
-        Ok(())
     }
 
     /// What a person wants to know at the end.

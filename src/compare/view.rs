@@ -3,7 +3,7 @@
 use super::{Comparison, Found, Kind, Member, fields, later, report, table};
 use crate::frame::RunInfo;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_plot};
-use crate::record::rerun_log::{Difference, Finished, Lane, RecordError, SideBySide, Sink};
+use crate::record::rerun_log::{Difference, Finished, RecordError, RecordedRun, SideBySide, Sink};
 use std::path::{Path, PathBuf};
 
 /// Columns that share a figure: its name, and title, column and name of the axis of each panel.
@@ -100,9 +100,9 @@ pub fn record(
     sinks: &[Sink],
 ) -> Result<(Comparison, Option<Finished>), RecordError> {
     let Found { mut comparison, differences } = found;
-    let lanes: Vec<Lane> = members
+    let lanes: Vec<RecordedRun> = members
         .iter()
-        .filter_map(|m| Some(Lane { info: m.info.clone()?, recorded: m.recorded.as_ref()? }))
+        .filter_map(|m| Some(RecordedRun { info: m.info.clone()?, recorded: m.recorded.as_ref()? }))
         .collect();
     if lanes.len() < 2 {
         // Whoever compares with a summary alone does not expect pictures.

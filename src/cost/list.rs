@@ -1,6 +1,7 @@
 //! The price list: what is printed, kept on disk and bought from.
 
 use super::reference::Kind;
+use crate::scene::{Scene, scene_hash};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -265,6 +266,11 @@ pub fn file_name(scene_name: &str, scene_hash: &str, quick: bool) -> String {
     );
     let hash: String = Sha256::digest(key).iter().take(8).map(|b| format!("{b:02x}")).collect();
     format!("{scene_name}-{hash}{}.json", if quick { "-quick" } else { "" })
+}
+
+/// The list of a scene that was kept here, if there is one.
+pub fn kept(scene: &Scene, quick: bool) -> Option<List> {
+    load(&folder()?.join(file_name(&scene.name, &scene_hash(scene), quick)))
 }
 
 /// A list that was kept. A file that cannot be read is as good as none: it is made again.

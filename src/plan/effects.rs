@@ -213,7 +213,9 @@ impl Plan {
             0,
             &["body force"],
         );
-        let stabilised = self.method.stabilisation;
+        let states = || std::iter::once(&self.state).chain(self.changes.iter().map(|c| &c.state));
+        let stabilised =
+            self.method.stabilisation.filter(|_| states().any(super::Matter::is_stratified));
         add(
             Stabilisation,
             stabilised.is_some(),

@@ -6,6 +6,7 @@
 //! plan's own [`Units`].
 
 pub mod boundary;
+mod change;
 mod effects;
 pub mod material;
 mod meshing;
@@ -59,6 +60,17 @@ pub struct Plan {
 pub struct Matter {
     pub materials: Vec<Material>,
     pub gravity: [f64; 2],
+    /// Largest step that leaves a stratified scene at rest where it is; `None` where nothing could
+    /// restore anything.
+    pub relaxation: Option<f64>,
+}
+
+impl Matter {
+    /// Whether there is more than one density.
+    pub fn is_stratified(&self) -> bool {
+        let m = &self.materials;
+        m.iter().any(|k| k.carries_density || k.density != m[0].density)
+    }
 }
 
 /// A change of matter.
@@ -92,7 +104,7 @@ pub struct EffectSet {
 }
 
 /// A part of the domain and the material that fills it at first (SI shapes).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     pub material: u8,
     pub shape: Area,
@@ -100,7 +112,7 @@ pub struct Region {
 }
 
 /// A shape in SI coordinates.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Area {
     Everywhere,
     Rectangle { x: [f64; 2], y: [f64; 2] },
@@ -122,7 +134,7 @@ impl Area {
 }
 
 /// Directors at the start.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum InitialDirector {
     /// Degrees, SI coordinates.
     Angle(FieldFn),
@@ -167,13 +179,13 @@ pub struct Mark {
 }
 
 /// Settings that buy accuracy.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
     pub seeding: Seeding,
     pub quadrature: Quadrature,
     pub integrator: Integrator,
-    /// Share of the next step by which restoring loads are taken ahead; `None` where no density
-    /// contrast could restore anything, or where it was switched off.
+    /// Share of the next step by which restoring loads are taken ahead while there is more than one
+    /// density; `None` without gravity, or where it was switched off.
     pub stabilisation: Option<f64>,
     pub tolerance: f64,
     pub max_corrections: u32,
@@ -186,9 +198,6 @@ pub struct ClockPlan {
     pub max_step: Option<f64>,
     pub courant: f64,
     pub strain: f64,
-    /// Largest step that leaves a stratified scene at rest where it is; `None` where nothing could
-    /// restore anything.
-    pub relaxation: Option<f64>,
     /// Times met exactly: frames and changes, ascending, the end included.
     pub stops: Vec<f64>,
     /// Times of frames, ascending.
@@ -196,7 +205,7 @@ pub struct ClockPlan {
 }
 
 /// What the recording shows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     pub colour_by: ColourBy,
     pub max_particles: usize,
@@ -215,6 +224,15 @@ impl Plan {
     /// Index of the material that fills what regions leave free.
     pub fn background(&self) -> Option<u8> {
         self.state.materials.iter().position(|m| m.background).map(|m| m as u8)
+    }
+
+    /// Whether a frame is due at a time (s), given how many were; counts on.
+    pub fn frame_is_due(&self, time: f64, count: &mut usize) -> bool {
+        let now = time / self.units.time * (1.0 + 1e-12);
+        let past = self.clock.frames.iter().take_while(|&&t| t <= now).count();
+        let due = past > *count;
+        *count = past.max(*count);
+        due
     }
 
     /// SI coordinates of a point.

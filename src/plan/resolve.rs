@@ -1,14 +1,15 @@
 //! The way from a scene to a plan: every default, every check.
 
 use super::boundary::{SIDES, add_body_force, side_normal};
+use super::change;
 use super::material::{CosseratLaw, Material};
 use super::meshing::{Line, Refinement, Sizing};
 use super::units::power_of_two;
 use super::*;
 use crate::laws::{cosserat, granular};
 use crate::scene::{
-    self, BoundaryKind, Change, Direction, Field, GradingTarget, Interesting, Moment, Quantity,
-    SceneError, Scope, Shape, WallKind, closest,
+    self, BoundaryKind, Direction, Field, GradingTarget, Interesting, Moment, Quantity, SceneError,
+    Scope, Shape, WallKind, closest,
 };
 use crate::space::mesh::Axis;
 use crate::space::walls::Obstacle;
@@ -42,7 +43,7 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
     let mut current = scene.clone();
     current.schedule.clear();
     for (index, change) in scene.schedule.iter().enumerate() {
-        apply_change(&mut current, change, index)?;
+        change::apply(&mut current, change, index)?;
         let scope = Scope::new(&current)?;
         let when = match (&change.time, change.step) {
             (Some(t), None) => When::Time(t.eval(&scope)? / plan.units.time),
@@ -55,35 +56,23 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
             }
         };
         let other = resolve_without_schedule(&current)?;
-        let units = plan.units;
-        let state = Si::new(&placed(&current), &scope)?.matter(&units);
-        if geometry(&other) != geometry(&plan)
-            || other.effects != plan.effects
-            || other.initial != plan.initial
-            || !same_history(&other.state, &plan.state)
-            || loads(&other) != loads(&plan)
-        {
+        if let Some(what) = plan.beyond_matter(&other) {
             return Err(SceneError::new(
                 format!(
-                    "schedule[{index}] changes the mesh or the set of solved effects, boundaries, \
-                     loads, or what particles carry; only constant material values and gravity \
+                    "schedule[{index}] changes {what}; only constant material values and gravity \
                      may change"
                 ),
                 "such a change needs a run of its own",
             ));
         }
-        let in_order = match (plan.changes.last().map(|c| c.when), when) {
-            (None, _) => true,
-            (Some(When::Time(before)), When::Time(now)) => before <= now,
-            (Some(When::Step(before)), When::Step(now)) => before <= now,
-            _ => false,
-        };
-        if !in_order {
+        if !follows(&plan.changes, when) {
             return Err(SceneError::new(
-                format!("schedule[{index}] does not come after the entry above it"),
-                "order [[schedule]], all entries by time or all by step",
+                format!("schedule[{index}] does not come after the entries above it"),
+                "order the entries of [[schedule]] that have a time, and those that have a step",
             ));
         }
+        let mut state = Si::new(&current, &scope)?.matter(&plan.units);
+        state.relaxation = relaxation(&state, &plan.mesh);
         let label =
             change.set.iter().map(|(k, v)| format!("{k} = {v}")).collect::<Vec<_>>().join(", ");
         plan.changes.push(PlannedChange { when, state, label });
@@ -95,20 +84,20 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
             plan.clock.stops.push(t);
         }
     }
-    let stratified = std::iter::once(&plan.state)
-        .chain(plan.changes.iter().map(|c| &c.state))
-        .any(|matter| plan.effects.gravity && has_contrast(&matter.materials));
-    let share = scene.accuracy.stabilisation;
-    plan.method.stabilisation = (stratified && share > 0.0).then_some(share);
-    plan.clock.relaxation = (0..=plan.changes.len())
-        .map(|k| if k == 0 { &plan.state } else { &plan.changes[k - 1].state })
-        .filter_map(|matter| relaxation(matter, &plan.mesh))
-        .reduce(f64::min)
-        .map(|time| RELAXATIONS * time);
     plan.clock.stops.sort_by(f64::total_cmp);
     let least = 1e-9 * plan.clock.end;
     plan.clock.stops.dedup_by(|b, a| *b - *a < least);
     Ok(plan)
+}
+
+/// Whether a change comes after those before it, as far as their kind of instant tells: which step
+/// a time will be in is not known yet.
+fn follows(before: &[PlannedChange], when: When) -> bool {
+    before.iter().all(|c| match (c.when, when) {
+        (When::Time(before), When::Time(now)) => before <= now,
+        (When::Step(before), When::Step(now)) => before <= now,
+        _ => true,
+    })
 }
 
 /// Steps are at most this many times the relaxation time of a stratification. At rest the solver
@@ -116,12 +105,13 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
 /// far times its number of relaxation times.
 const RELAXATIONS: f64 = 1e4;
 
-/// `eta/(rho g L)` with the largest viscosity, for constant densities that differ.
+/// Longest step, some `eta/(rho g L)` with the largest viscosity, for densities that differ.
 fn relaxation(matter: &Matter, mesh: &Mesh) -> Option<f64> {
     let largest = |f: fn(&Material) -> f64| matter.materials.iter().map(f).fold(0.0, f64::max);
     let extent = (mesh.x.end() - mesh.x.start()).max(mesh.y.end() - mesh.y.start());
     let weight = largest(|m| m.density) * matter.gravity[0].hypot(matter.gravity[1]) * extent;
-    (weight > 0.0 && has_contrast(&matter.materials)).then(|| largest(|m| m.viscosity) / weight)
+    (weight > 0.0 && matter.is_stratified())
+        .then(|| RELAXATIONS * largest(|m| m.viscosity) / weight)
 }
 
 /// Ratio of viscosities from which on drops in a thin fluid are worth a warning: the silo took
@@ -140,99 +130,6 @@ fn thin_fluid(materials: &[SiMaterial]) -> Option<Warning> {
             thin: b.name.clone(),
             ratio: ratio(a, b),
         })
-}
-
-/// Whether there is more than one density.
-fn has_contrast(materials: &[Material]) -> bool {
-    materials.iter().any(|m| m.carries_density || m.density != materials[0].density)
-}
-
-/// What a scheduled change must leave as it is, in SI units.
-fn geometry(p: &Plan) -> (Vec<f64>, Vec<[f64; 2]>) {
-    let l = p.units.length;
-    let lines = p.mesh.x.lines().iter().chain(p.mesh.y.lines()).map(|v| v * l).collect();
-    let walls = p
-        .enclosure
-        .obstacles
-        .iter()
-        .flat_map(|o| [[o.at * l, o.normal as f64], [o.from * l, o.to * l]])
-        .collect();
-    (lines, walls)
-}
-
-/// Materials carry the same columns and have the same kind of law.
-fn same_history(a: &Matter, b: &Matter) -> bool {
-    let kind = |m: &Material| {
-        (m.carries_viscosity, m.carries_density, m.layer_viscosity.is_some(), m.rotation.is_some())
-    };
-    a.materials.iter().map(kind).eq(b.materials.iter().map(kind))
-}
-
-/// Given nodal values and fixed loads in SI units.
-fn loads(p: &Plan) -> Vec<f64> {
-    let (mesh, units) = (&p.mesh, &p.units);
-    let given = p.boundary.constraints::<3>(mesh, units);
-    let mut load = vec![[0.0; 3]; mesh.nodes()];
-    p.boundary.add_tractions(mesh, units, &mut load);
-    if let Some(f) = &p.body_force {
-        add_body_force(mesh, units, f, &mut load);
-    }
-    let force = units.stress() * units.length;
-    let scale = [units.velocity(), units.velocity(), units.rate()];
-    let mut out: Vec<f64> = load.iter().flatten().map(|f| f * force).collect();
-    for node in 0..mesh.nodes() {
-        out.extend((0..3).filter_map(|c| Some(given.fixed_value(node, c)? * scale[c])));
-    }
-    out
-}
-
-/// Sets parameters, material values and gravity of a scene.
-fn apply_change(scene: &mut Scene, change: &Change, index: usize) -> Result<()> {
-    for (key, value) in &change.set {
-        let place = format!("schedule[{index}].set: ");
-        let slot = key.split(['.', '[']).collect::<Vec<_>>();
-        if let Some(parameter) = scene.parameters.get_mut(key) {
-            parameter.value = Some(value.clone());
-            continue;
-        }
-        let ok = match slot.as_slice() {
-            ["gravity", "0]"] => {
-                scene.gravity[0] = value.clone();
-                true
-            }
-            ["gravity", "1]"] => {
-                scene.gravity[1] = value.clone();
-                true
-            }
-            ["materials", name, field] => match scene.materials.get_mut(*name) {
-                Some(m) => set_material(m, field, value),
-                None => false,
-            },
-            _ => false,
-        };
-        if !ok {
-            return Err(SceneError::at(
-                value,
-                format!("{place}`{key}` cannot be scheduled"),
-                "a parameter's name, `gravity[0]`, `gravity[1]` or `materials.<name>.<value>` can",
-            ));
-        }
-    }
-    Ok(())
-}
-
-fn set_material(m: &mut scene::Material, field: &str, value: &Quantity) -> bool {
-    match field {
-        "density" => m.density = value.clone().into(),
-        "shear_viscosity" => m.shear_viscosity = Some(value.clone().into()),
-        "bulk_viscosity" => m.bulk_viscosity = Some(value.clone()),
-        "coupling_viscosity" => m.coupling_viscosity = Some(value.clone()),
-        "internal_length" => m.internal_length = Some(value.clone()),
-        "couple_viscosity" => m.couple_viscosity = Some(value.clone()),
-        "layer_viscosity" => m.layer_viscosity = Some(value.clone()),
-        _ => return false,
-    }
-    true
 }
 
 /// Materials and gravity in SI units, checked.
@@ -305,7 +202,8 @@ impl Si {
                 background: m.background,
             })
             .collect();
-        Matter { materials, gravity: self.gravity.map(|g| g / u.acceleration()) }
+        let gravity = self.gravity.map(|g| g / u.acceleration());
+        Matter { materials, gravity, relaxation: None }
     }
 }
 
@@ -600,13 +498,14 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
     }
     let si = Si::new(scene, scope)?;
     let units = choose_units(scene, scope, &si, domain, length)?;
-    let state = si.matter(&units);
+    let mut state = si.matter(&units);
     warnings.extend(si.warnings.iter().cloned());
 
     let walls = Walls::new(scene, scope, domain)?;
     let gauges = gauges(scene, scope, domain)?;
     interest(scene)?;
     let mesh = Arc::new(mesh(scene, scope, domain, length, &walls, &gauges, &units)?);
+    state.relaxation = relaxation(&state, &mesh);
     let sides = sides(scene, scope, domain)?;
     let boundary = boundary(sides, &walls, &mesh, &units, &state)?;
     let mut enclosure = walls.enclosure(scene, &mesh, &units);
@@ -696,7 +595,11 @@ fn resolve_without_schedule(scene: &Scene) -> Result<Plan> {
         gauges,
         tracers,
         marks,
-        method: method(scene)?,
+        method: Method {
+            stabilisation: Some(scene.accuracy.stabilisation)
+                .filter(|&share| share > 0.0 && effects.gravity),
+            ..method(scene)?
+        },
         clock: clock(scene, scope, &units)?,
         picture: picture(scene)?,
         effects,
@@ -1612,7 +1515,6 @@ fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<ClockPlan> {
     Ok(ClockPlan {
         end,
         max_step: max_step.map(|v| v / units.time),
-        relaxation: None,
         courant: t.courant,
         strain: t.strain,
         stops,

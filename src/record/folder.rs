@@ -31,20 +31,23 @@ const MOST: u32 = 100_000;
 /// Makes the folder of a run: `out` as given, which must not hold a run unless `force`; else
 /// `runs/<name>`, or `runs/<name>-2`, `-3`, ... if taken.
 pub fn create(name: &str, out: Option<&Path>, force: bool) -> Result<PathBuf, FolderError> {
-    let wanted = out.map_or_else(|| Path::new("runs").join(name), Path::to_path_buf);
+    let runs = Path::new("runs");
+    let wanted = out.map_or_else(|| runs.join(name), Path::to_path_buf);
     if force || !holds_run(&wanted) {
         return make(&wanted, force);
     }
     if out.is_some() {
         return Err(FolderError::Taken(wanted));
     }
-    for k in 2..MOST {
-        let next = Path::new("runs").join(format!("{name}-{k}"));
-        if !holds_run(&next) {
-            return make(&next, false);
-        }
-    }
-    Err(FolderError::Taken(wanted))
+    create_below(runs, name)
+}
+
+/// Makes the folder of a run, `<parent>/<name>`, or `<name>-2`, `-3`, ... if taken.
+pub fn create_below(parent: &Path, name: &str) -> Result<PathBuf, FolderError> {
+    let wanted = parent.join(name);
+    let numbered = (2..MOST).map(|k| parent.join(format!("{name}-{k}")));
+    let free = std::iter::once(wanted.clone()).chain(numbered).find(|path| !holds_run(path));
+    make(&free.ok_or(FolderError::Taken(wanted))?, false)
 }
 
 /// Takes back what a run that could not start has left: a recording, and the folder if empty.

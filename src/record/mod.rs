@@ -7,6 +7,7 @@ pub mod logger;
 pub mod number;
 pub mod plots;
 pub mod rerun_log;
+pub mod run_plots;
 pub mod series;
 pub mod sheet;
 pub mod summary;

@@ -21,6 +21,8 @@ mod race;
 mod read;
 mod side_by_side;
 mod sinks;
+mod stage;
+mod viewer;
 
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
@@ -32,8 +34,10 @@ use rerun::{EntityPath, EntityPathPart, RecordingStream};
 
 pub use race::Race;
 pub use read::{ReadError, Recorded, Sample};
-pub use side_by_side::{Difference, Lane, SideBySide};
+pub use side_by_side::{Difference, RecordedRun, SideBySide};
 pub use sinks::{Saved, Sink};
+pub use stage::Lane;
+pub use viewer::{ViewerFile, viewer_file};
 
 use crate::frame::{
     Frame, GridField, Isoline, ParticleSnapshot, Picture, Quantity, Rect, RunInfo, Scalar,
@@ -209,22 +213,31 @@ impl Served {
 impl RerunLog {
     /// Starts a recording: destinations, layout and all that does not change.
     pub fn open(info: &RunInfo, sinks: &[Sink]) -> Result<Self, RecordError> {
-        let to = Destinations::open(sinks)?;
-        let rec = stream(&info.recording_id, to.sinks, !to.viewers.is_empty())?;
+        let mut to = Destinations::open(sinks)?;
+        let rec = to.begin(&info.recording_id)?;
         blueprint::send(&rec, info, &Paths::new(&info.name))?;
         rec.send_recording_name(info.name.as_str())?;
-        let mut log = Self::of(rec, info);
+        Self::of(rec, info).towards(to, info)
+    }
+
+    /// Attaches destinations, and records all that does not change.
+    fn towards(mut self, to: Destinations, info: &RunInfo) -> Result<Self, RecordError> {
+        let log = &mut self;
         log.files = to.files;
         log.viewers = to.viewers;
         log.page = to.page;
-        log.world(info)?;
-        log.texts(info)?;
-        log.curves(info)?;
+        log.constant(info)?;
         // A viewer that is absent from the start is a mistake in the command; the check forgets it.
         let wanted = log.viewers.clone();
         log.check()?;
         wanted.iter().try_for_each(Live::check)?;
-        Ok(log)
+        Ok(self)
+    }
+
+    fn constant(&mut self, info: &RunInfo) -> Result<(), RecordError> {
+        self.world(info)?;
+        self.texts(info)?;
+        self.curves(info)
     }
 
     /// A run that goes to a stream, without destinations of its own.
@@ -254,7 +267,7 @@ impl RerunLog {
         }
     }
 
-    /// What to open in a browser, if the recording is served.
+    /// What to open in a browser, or in a viewer if only data is streamed.
     pub fn url(&self) -> Option<&str> {
         self.page.as_ref().map(|page| page.url.as_str())
     }
@@ -667,28 +680,6 @@ impl RerunLog {
         self.isolines = groups.into_keys().collect();
         Ok(())
     }
-}
-
-/// A recording without any content yet.
-fn stream(
-    id: &str,
-    sinks: Vec<Box<dyn rerun::sink::LogSink>>,
-    live: bool,
-) -> Result<RecordingStream, RecordError> {
-    let mut builder = rerun::RecordingStreamBuilder::new(APPLICATION)
-        .recording_id(id)
-        // The RERUN environment variable must not silence a recording that was asked for.
-        .enabled(true);
-    if !live {
-        builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
-            flush_tick: FILE_TICK,
-            ..Default::default()
-        });
-    }
-    let rec = builder.set_sinks(sinks)?;
-    rec.set_log_time_enabled(false);
-    rec.set_log_tick_enabled(false);
-    Ok(rec)
 }
 
 fn rgb([r, g, b]: [u8; 3]) -> Color {

@@ -3,7 +3,7 @@
 use super::logger::Traffic;
 use crate::scene::scene_hash;
 use crate::sim::Run;
-use crate::sim::row::{GaugeRow, Phases};
+use crate::sim::row::{GaugeRow, Phases, Row};
 use indexmap::IndexMap;
 use serde::Serialize;
 
@@ -121,6 +121,29 @@ pub struct Tally {
     pub traffic: Traffic,
     pub logger_seconds: f64,
     pub warnings: Vec<String>,
+}
+
+impl Tally {
+    /// Of a run that stands at its first instant.
+    pub fn new(first: &Row, warnings: Vec<String>) -> Tally {
+        Tally {
+            phases: Phases::default(),
+            wall: 0.0,
+            largest_power_error: 0.0,
+            largest_divergence: 0.0,
+            first_energy: first.potential_energy,
+            traffic: Traffic::default(),
+            logger_seconds: 0.0,
+            warnings,
+        }
+    }
+
+    /// Counts a step in.
+    pub fn add(&mut self, row: &Row) {
+        self.phases.add(&row.seconds);
+        self.largest_power_error = self.largest_power_error.max(row.power_error);
+        self.largest_divergence = self.largest_divergence.max(row.divergence_error);
+    }
 }
 
 impl Summary {

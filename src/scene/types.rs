@@ -557,7 +557,7 @@ pub enum FieldName {
     Alignment,
 }
 
-/// At a time or before a step, set keys: parameters by name, others by path.
+/// From a time on, or with the solution of a step, set keys: parameters by name, others by path.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Change {

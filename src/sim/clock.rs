@@ -37,13 +37,15 @@ impl Limiter {
     }
 }
 
-/// What the flow says about the step.
+/// What the flow and its matter say about the step.
 #[derive(Clone, Copy, Debug)]
 pub struct Speeds {
     /// Largest number of cells crossed per unit time.
     pub crossings: f64,
     /// Largest strain rate of layered material.
     pub strain_rate: f64,
+    /// Longest step that the stratification stands.
+    pub relaxation: Option<f64>,
 }
 
 /// Growth of the step from one to the next: extrapolation of the velocity needs similar steps.
@@ -69,7 +71,7 @@ pub fn next_step(
     if let Some(dt) = clock.max_step {
         limit(dt, Limiter::MaxStep);
     }
-    if let Some(dt) = clock.relaxation {
+    if let Some(dt) = speeds.relaxation {
         limit(dt, Limiter::Relaxation);
     }
     if let Some(dt) = previous {

@@ -89,7 +89,7 @@ impl<const D: usize> Simulation<D> {
             self.matter.materials.iter().map(|m| m.layer_viscosity.is_some()).collect();
         let velocity = &self.flow.velocity;
         let crossings = self.crossings(|node| [velocity[node][0], velocity[node][1]]);
-        let mut speeds = Speeds { crossings, strain_rate: 0.0 };
+        let mut speeds = Speeds { crossings, strain_rate: 0.0, relaxation: self.matter.relaxation };
         if !self.plan.effects.directors {
             return speeds;
         }

@@ -152,6 +152,10 @@ pub trait Run: Send {
     fn warnings(&self) -> Vec<Warning>;
     /// What happened in the last step: changes of matter.
     fn events(&self) -> &[String];
+    /// How many of the plan's changes lie behind.
+    fn changes_applied(&self) -> usize;
+    /// Goes on with another plan, made by [`Plan::with_change`]: the two share all that lies behind.
+    fn replan(&mut self, plan: Arc<Plan>);
 }
 
 /// Velocity and rotation (zero if none is solved) of a flow, m/s and 1/s, at an SI point.
@@ -410,7 +414,8 @@ impl<const D: usize> Simulation<D> {
 
     /// How far ahead restoring loads are taken, for a step of `dt`.
     fn ahead(&self, dt: f64) -> Option<f64> {
-        self.plan.method.stabilisation.map(|share| share * dt)
+        let share = self.plan.method.stabilisation.filter(|_| self.matter.is_stratified());
+        share.map(|share| share * dt)
     }
 
     /// The step to come, as far as the flow before and the step before can tell.
@@ -569,5 +574,11 @@ impl<const D: usize> Run for Simulation<D> {
     }
     fn events(&self) -> &[String] {
         &self.events
+    }
+    fn changes_applied(&self) -> usize {
+        self.next_change
+    }
+    fn replan(&mut self, plan: Arc<Plan>) {
+        self.plan = plan;
     }
 }

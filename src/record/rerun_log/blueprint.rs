@@ -41,13 +41,22 @@ pub(super) fn send(
     info: &RunInfo,
     paths: &Paths,
 ) -> Result<(), RecordError> {
-    lay_out(rec, &info.recording_id, SIM_TIME, |writer| writer.run(info, paths))
+    lay_out(rec, &info.recording_id, SIM_TIME, 0, |writer| writer.run(info, paths))
 }
 
 /// Sends the layout of runs side by side, on the timeline of seconds computed.
 pub(super) fn send_race(rec: &RecordingStream, infos: &[RunInfo]) -> Result<(), RecordError> {
     let id = infos.first().map_or("race", |info| info.recording_id.as_str());
-    lay_out(rec, id, WALL_TIME, |writer| writer.race(infos))
+    lay_out(rec, id, WALL_TIME, 0, |writer| writer.race(infos))
+}
+
+/// Sends the layout of runs side by side on one time cursor: the flows, and no plots.
+pub(super) fn send_stage(rec: &RecordingStream, infos: &[&RunInfo]) -> Result<(), RecordError> {
+    let id = infos.last().map_or("stage", |info| info.recording_id.as_str());
+    // Layouts that follow each other in one viewer must not share identifiers: it would take a view
+    // for another one of the same name.
+    let first = id.bytes().fold(0_u64, |all, b| all.wrapping_mul(31).wrapping_add(u64::from(b)));
+    lay_out(rec, id, SIM_TIME, first << 16, |writer| writer.stage(infos))
 }
 
 /// Sends the layout of a comparison: runs above, differences, curves and texts below.
@@ -58,13 +67,14 @@ pub(super) fn send_comparison(
     differences: &[(&RunInfo, Paths)],
     texts: &[(&str, rerun::EntityPath)],
 ) -> Result<(), RecordError> {
-    lay_out(rec, id, SIM_TIME, |writer| writer.comparison(infos, differences, texts))
+    lay_out(rec, id, SIM_TIME, 0, |writer| writer.comparison(infos, differences, texts))
 }
 
 fn lay_out(
     rec: &RecordingStream,
     id: &str,
     timeline: &str,
+    first: u64,
     write: impl FnOnce(&mut Writer) -> Result<Node, RecordError>,
 ) -> Result<(), RecordError> {
     let (layout, storage) = rerun::RecordingStreamBuilder::new(APPLICATION)
@@ -76,7 +86,7 @@ fn lay_out(
     layout.set_log_tick_enabled(false);
     layout.set_time_sequence("blueprint", 0);
 
-    let mut writer = Writer { rec: &layout, count: 0 };
+    let mut writer = Writer { rec: &layout, count: first };
     let root = write(&mut writer)?;
     layout.log(
         "viewport",
@@ -159,14 +169,47 @@ impl Writer<'_> {
         }
     }
 
+    /// The flow with its fields in tabs beside it; several runs side by side, fields below.
+    fn stage(&mut self, infos: &[&RunInfo]) -> Result<Node, RecordError> {
+        let alone = infos.len() == 1;
+        let mut lanes = vec![];
+        for info in infos {
+            let paths = Paths::new(&info.name);
+            let [width, height] = info.domain.size();
+            let flow = if alone { self.flow(info, &paths)? } else { self.lane(info, &paths)? };
+            let mut fields = self.fields(info, &paths)?;
+            if alone {
+                fields.push(self.text("Plan", &paths.at("plan"))?);
+                fields.push(self.text("Scene", &paths.at("scene"))?);
+                fields.push(self.log(&paths.at("log"))?);
+            }
+            let mut parts = vec![flow];
+            if !fields.is_empty() {
+                parts.push(self.tabs(&fields)?);
+            }
+            let kind = if alone && width < WIDE * height {
+                components::ContainerKind::Horizontal
+            } else {
+                components::ContainerKind::Vertical
+            };
+            let shares = if parts.len() == 2 { vec![1.0, 1.0] } else { vec![] };
+            lanes.push(self.stack(kind, &parts, &shares)?);
+        }
+        self.stack(components::ContainerKind::Horizontal, &lanes, &[])
+    }
+
+    /// The flow of a run among others, under its name.
+    fn lane(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {
+        self.space(&info.name, paths, &FLOW, bar::seen(info.domain, bar::Room::Large))
+    }
+
     /// A column for each run, their first plot below.
     fn race(&mut self, infos: &[RunInfo]) -> Result<Node, RecordError> {
         let mut lanes = vec![];
         let mut contents = vec![];
         for info in infos {
             let paths = Paths::new(&info.name);
-            let seen = bar::seen(info.domain, bar::Room::Large);
-            let mut lane = vec![self.space(&info.name, &paths, &FLOW, seen)?];
+            let mut lane = vec![self.lane(info, &paths)?];
             lane.extend(self.fields(info, &paths)?.into_iter().take(1));
             lanes.push(self.stack(components::ContainerKind::Vertical, &lane, &[])?);
             let series = info.plots.iter().take(1).flat_map(|plot| &plot.series);

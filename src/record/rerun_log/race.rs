@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::sinks::{Destinations, Sink};
-use super::{Finished, RecordError, RerunLog, blueprint, stream};
+use super::{Finished, RecordError, RerunLog, blueprint};
 use crate::frame::{Frame, RunInfo};
 use crate::record::color::OKABE_ITO;
 
@@ -16,17 +16,16 @@ impl Race {
     /// Starts a recording of runs, which need names of their own; the first one's identity is that
     /// of the recording.
     pub fn open(infos: &[RunInfo], title: &str, path: &Path) -> Result<Self, RecordError> {
-        let to = Destinations::open(&[Sink::Save(path.to_owned())])?;
+        let mut to = Destinations::open(&[Sink::Save(path.to_owned())])?;
         let id = infos.first().map_or("race", |info| info.recording_id.as_str());
-        let rec = stream(id, to.sinks, false)?;
+        let rec = to.begin(id)?;
         blueprint::send_race(&rec, infos)?;
         rec.send_recording_name(title)?;
         let mut lanes = Vec::new();
         for (info, color) in infos.iter().zip(OKABE_ITO.iter().cycle()) {
             let mut lane = RerunLog::of(rec.clone(), info);
-            lane.world(info)?;
-            lane.texts(info)?;
-            lane.curves(info)?;
+            lane.constant(info)?;
+            // Curves of several runs share a plot: a colour tells the run.
             lane.one_color(info, None, *color)?;
             lanes.push(lane);
         }

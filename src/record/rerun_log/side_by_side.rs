@@ -4,7 +4,7 @@
 use rerun::{EntityPath, EntityPathPart, archetypes};
 
 use super::sinks::{Destinations, Sink};
-use super::{Finished, Paths, RecordError, Recorded, RerunLog, SIM_TIME, blueprint, stream};
+use super::{Finished, Paths, RecordError, Recorded, RerunLog, SIM_TIME, blueprint};
 use crate::frame::{GridField, Rect, RunInfo};
 use crate::record::color::OKABE_ITO;
 
@@ -15,7 +15,7 @@ const AFTER: f64 = 1e-9;
 const DIFFERENCES: &str = "differences";
 
 /// A run to be shown, under the name that its [`RunInfo`] has.
-pub struct Lane<'a> {
+pub struct RecordedRun<'a> {
     /// What does not change during the run.
     pub info: RunInfo,
     /// What changes.
@@ -46,12 +46,12 @@ impl SideBySide<'_> {
     /// Writes everything; it is served, if asked for, until the result is dropped.
     pub fn write(
         &self,
-        lanes: &[Lane],
+        lanes: &[RecordedRun],
         differences: &[Difference],
         sinks: &[Sink],
     ) -> Result<Finished, RecordError> {
-        let to = Destinations::open(sinks)?;
-        let rec = stream(self.id, to.sinks, !to.viewers.is_empty())?;
+        let mut to = Destinations::open(sinks)?;
+        let rec = to.begin(self.id)?;
         let pairs: Vec<(&RunInfo, Paths)> =
             differences.iter().map(|d| (&d.info, difference_paths(&d.info))).collect();
         let texts: Vec<(&str, EntityPath)> =

@@ -16,7 +16,9 @@ use rerun::external::{re_grpc_server, re_uri};
 use rerun::log::LogMsg;
 use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
 
-use super::RecordError;
+use rerun::RecordingStream;
+
+use super::{APPLICATION, FILE_TICK, RecordError};
 
 /// How long a viewer may take to swallow what was sent before it is given up.
 const VIEWER_PATIENCE: Duration = Duration::from_secs(5);
@@ -26,6 +28,9 @@ const VIEWER_PATIENCE: Duration = Duration::from_secs(5);
 /// Half of what a 1 GiB process may spend: the same frames are held once more
 /// by the viewer itself, often on the same machine.
 const SERVER_HISTORY_BYTES: u64 = 512 * 1024 * 1024;
+
+/// Everything that is served is served to this machine only.
+const HOST: Ipv4Addr = Ipv4Addr::LOCALHOST;
 
 /// A destination of the recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,6 +46,8 @@ pub enum Sink {
         /// Port of the data; 0 takes any free one.
         grpc_port: u16,
     },
+    /// The data alone, served to viewers on this machine that are told its address.
+    Stream,
     /// The `rerun` viewer found on the path, started now.
     Spawn,
 }
@@ -170,8 +177,8 @@ impl LogSink for LiveSink {
 /// A page that shows the recording in a browser, for as long as this lives.
 pub(super) struct Page {
     pub(super) url: String,
-    /// Stops serving when dropped.
-    _server: Box<dyn std::any::Any + Send>,
+    /// Stops serving when dropped; absent where the data alone is served.
+    _server: Option<Box<dyn std::any::Any + Send>>,
 }
 
 /// All destinations of one recording.
@@ -184,6 +191,24 @@ pub(super) struct Destinations {
 }
 
 impl Destinations {
+    /// Starts a recording that goes to all of them.
+    pub(super) fn begin(&mut self, id: &str) -> Result<RecordingStream, RecordError> {
+        let mut builder = rerun::RecordingStreamBuilder::new(APPLICATION)
+            .recording_id(id)
+            // The RERUN environment variable must not silence a recording that was asked for.
+            .enabled(true);
+        if self.viewers.is_empty() {
+            builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
+                flush_tick: FILE_TICK,
+                ..Default::default()
+            });
+        }
+        let rec = builder.set_sinks(std::mem::take(&mut self.sinks))?;
+        rec.set_log_time_enabled(false);
+        rec.set_log_tick_enabled(false);
+        Ok(rec)
+    }
+
     pub(super) fn open(sinks: &[Sink]) -> Result<Self, RecordError> {
         let mut all = Self::default();
         for sink in sinks {
@@ -195,6 +220,7 @@ impl Destinations {
                 }
                 Sink::Connect(url) => all.connect(url)?,
                 Sink::Serve { web_port, grpc_port } => all.serve(*web_port, *grpc_port)?,
+                Sink::Stream => all.stream()?,
                 Sink::Spawn => all.spawn()?,
             }
         }
@@ -228,22 +254,9 @@ impl Destinations {
     }
 
     fn serve(&mut self, web_port: u16, grpc_port: u16) -> Result<(), RecordError> {
-        let host = Ipv4Addr::LOCALHOST.to_string();
         let [grpc_port, web_port] = claim([grpc_port, web_port])?;
-        let data = rerun::grpc_server::GrpcServerSink::new(
-            &host,
-            grpc_port,
-            re_grpc_server::ServerOptions {
-                memory_limit: rerun::MemoryLimit::from_bytes(SERVER_HISTORY_BYTES),
-                ..Default::default()
-            },
-        )
-        .map_err(|e| RecordError::Viewer {
-            name: format!("port {grpc_port}"),
-            cause: e.to_string(),
-        })?;
         let page = rerun::serve_web_viewer(rerun::web_viewer::WebViewerConfig {
-            bind_ip: host.clone(),
+            bind_ip: HOST.to_string(),
             web_port: web_port.into(),
             open_browser: false,
             ..Default::default()
@@ -252,13 +265,35 @@ impl Destinations {
             name: format!("port {web_port}"),
             cause: e.to_string(),
         })?;
+        self.data(grpc_port, format!("page on port {web_port}"))?;
         self.page = Some(Page {
             url: format!(
-                "http://{host}:{web_port}/?url=rerun%2Bhttp%3A%2F%2F{host}%3A{grpc_port}%2Fproxy"
+                "http://{HOST}:{web_port}/?url=rerun%2Bhttp%3A%2F%2F{HOST}%3A{grpc_port}%2Fproxy"
             ),
-            _server: Box::new(page),
+            _server: Some(Box::new(page)),
         });
-        self.add_viewer(format!("page on port {web_port}"), Box::new(data));
+        Ok(())
+    }
+
+    fn stream(&mut self) -> Result<(), RecordError> {
+        let [port, _] = claim([0, 0])?;
+        self.data(port, format!("data on port {port}"))?;
+        self.page = Some(Page { url: format!("rerun+http://{HOST}:{port}/proxy"), _server: None });
+        Ok(())
+    }
+
+    /// Serves the data; viewers that come late get what was sent before.
+    fn data(&mut self, port: u16, name: String) -> Result<(), RecordError> {
+        let sink = rerun::grpc_server::GrpcServerSink::new(
+            &HOST.to_string(),
+            port,
+            re_grpc_server::ServerOptions {
+                memory_limit: rerun::MemoryLimit::from_bytes(SERVER_HISTORY_BYTES),
+                ..Default::default()
+            },
+        )
+        .map_err(|e| RecordError::Viewer { name: format!("port {port}"), cause: e.to_string() })?;
+        self.add_viewer(name, Box::new(sink));
         Ok(())
     }
 }
@@ -268,7 +303,7 @@ impl Destinations {
 /// Rerun's server thread would report a busy port to nobody.
 fn claim(ports: [u16; 2]) -> Result<[u16; 2], RecordError> {
     let bind = |port| {
-        TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+        TcpListener::bind((HOST, port))
             .and_then(|listener| Ok((listener.local_addr()?.port(), listener)))
             .map_err(|source| RecordError::Port { port, source })
     };

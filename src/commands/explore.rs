@@ -1,0 +1,76 @@
+//! `grainscope explore`: a page to turn the knobs while it flows.
+
+use super::Failure;
+use crate::explorer::{Explorer, ExplorerError, Settings};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Turn the knobs while it flows: opens a page in your browser.
+///
+/// The page is served from this process to this machine only, under an address with a random
+/// token. Closing the page does not end the run; Ctrl-C, or "Quit" in the page, does.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Preset name or path of a TOML file
+    #[arg(default_value = "silo")]
+    scene: String,
+    /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// Open the page in the browser
+    #[arg(long)]
+    open: bool,
+    /// Stand at the first instant until told to run
+    #[arg(long)]
+    paused: bool,
+    /// Port of the page; 0 takes any free one
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    port: u16,
+    /// Folder whose scenes are offered beside the presets
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    dir: PathBuf,
+    /// Folder that saved runs go to
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    out: PathBuf,
+}
+
+impl From<ExplorerError> for Failure {
+    fn from(e: ExplorerError) -> Self {
+        Failure::Environment(e.to_string())
+    }
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let (scene, from_file) = super::find(&args.scene)?;
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = interrupted.clone();
+    let watching = ctrlc::set_handler(move || {
+        // The first one lets the step end, the second one does not wait.
+        if flag.swap(true, Ordering::SeqCst) {
+            std::process::exit(0);
+        }
+    });
+    if let Err(e) = watching {
+        eprintln!("warning: interrupts end the program at once: {e}");
+    }
+    let explorer = Explorer::open(Settings {
+        scene,
+        from_file,
+        sets: args.sets.clone(),
+        folder: args.dir.clone(),
+        out: args.out.clone(),
+        port: args.port,
+        paused: args.paused,
+        interrupted,
+    })?;
+    super::print(&explorer.url)?;
+    eprintln!("open it in a browser; Ctrl-C ends");
+    if args.open
+        && let Err(e) = webbrowser::open(&explorer.url)
+    {
+        eprintln!("warning: no browser could be opened: {e}");
+    }
+    explorer.wait();
+    Ok(())
+}

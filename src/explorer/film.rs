@@ -1,0 +1,101 @@
+//! The frames of a run that are kept for showing it again.
+
+use crate::frame::{Frame, Picture};
+use std::sync::Arc;
+
+/// Memory that the pictures of a run may take, bytes.
+const BUDGET: usize = 192 << 20;
+
+/// Frames in order. All numbers are kept; where pictures would take too much memory, every second
+/// one of those that the scene did not ask for goes, and then of all.
+#[derive(Clone, Default)]
+pub struct Film {
+    frames: Vec<Arc<Frame>>,
+    /// Which of them the scene asked for.
+    wanted: Vec<bool>,
+    bytes: usize,
+}
+
+impl Film {
+    pub fn push(&mut self, frame: Arc<Frame>, wanted: bool) {
+        self.bytes += size(&frame);
+        self.frames.push(frame);
+        self.wanted.push(wanted);
+        if self.bytes > BUDGET {
+            self.thin(false);
+        }
+        if self.bytes > BUDGET {
+            self.thin(true);
+        }
+    }
+
+    pub fn frames(&self) -> &[Arc<Frame>] {
+        &self.frames
+    }
+
+    /// Whether the last frame shows its instant.
+    pub fn ends_in_a_picture(&self) -> bool {
+        self.frames.last().is_some_and(|f| f.picture.is_some())
+    }
+
+    /// Takes every second picture out; the first and the last stay.
+    fn thin(&mut self, wanted_too: bool) {
+        let last = self.frames.len().saturating_sub(1);
+        let mut out = true;
+        for k in 1..last {
+            if self.frames[k].picture.is_none() || (self.wanted[k] && !wanted_too) {
+                continue;
+            }
+            out = !out;
+            if !out {
+                let frame = Frame { picture: None, ..Frame::clone(&self.frames[k]) };
+                self.frames[k] = Arc::new(frame);
+            }
+        }
+        self.bytes = self.frames.iter().map(|f| size(f)).sum();
+    }
+}
+
+/// Bytes of the picture, roughly.
+fn size(frame: &Frame) -> usize {
+    let Some(p) = &frame.picture else { return 0 };
+    let Picture { particles, dye_lines, glyphs, fields, arrows, isolines } = p;
+    let arrows = arrows.as_ref().map_or(0, |a| 16 * a.origins.len());
+    let strips = isolines.iter().flat_map(|i| &i.strips).map(Vec::len).sum::<usize>();
+    10 * particles.positions.len()
+        + particles.scalar.as_ref().map_or(0, |s| 4 * s.values.len())
+        + 8 * dye_lines.iter().map(Vec::len).sum::<usize>()
+        + 16 * glyphs.len()
+        + 4 * fields.iter().map(|f| f.values.len()).sum::<usize>()
+        + arrows
+        + 8 * strips
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::ParticleSnapshot;
+
+    #[test]
+    fn memory_is_bounded_and_wanted_pictures_stay_longest() {
+        let large = || Picture {
+            particles: ParticleSnapshot {
+                positions: vec![[0.0; 2]; BUDGET / 400],
+                ..Default::default()
+            },
+            ..Default::default()
+        };
+        let mut film = Film::default();
+        for step in 0..120 {
+            let frame = Frame { step, picture: Some(large()), ..Default::default() };
+            film.push(Arc::new(frame), step % 10 == 0);
+            assert!(film.bytes <= BUDGET);
+            assert!(film.ends_in_a_picture());
+        }
+        assert_eq!(film.frames().len(), 120);
+        let kept: Vec<u64> =
+            film.frames().iter().filter(|f| f.picture.is_some()).map(|f| f.step).collect();
+        assert!(kept.len() > 15 && kept.len() <= 41, "{kept:?}");
+        assert!((0..12).all(|k| kept.contains(&(10 * k))), "{kept:?}");
+    }
+}

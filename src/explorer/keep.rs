@@ -1,0 +1,114 @@
+//! Writing a run into a folder: what `grainscope run` would have left.
+
+use super::live::Live;
+use super::protocol::{Mode, SavedState};
+use crate::record::folder::{self, FolderError};
+use crate::record::plots::PlotError;
+use crate::record::rerun_log::{RecordError, RerunLog, Sink};
+use crate::record::run_plots::plots_of_run;
+use crate::record::series::SeriesWriter;
+use crate::record::summary::{Ending, Summary, Tally};
+use crate::scene::to_toml;
+use std::path::{Path, PathBuf};
+
+/// Longest name of a folder.
+const MAX_NAME: usize = 64;
+
+/// Why a run was not saved.
+#[derive(Debug, thiserror::Error)]
+pub enum KeepError {
+    #[error("{0:?} cannot name a folder: use 1 to 64 letters, digits, `_` and `-`")]
+    Name(String),
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    #[error("{} cannot be written: {source}", path.display())]
+    Write { path: PathBuf, source: std::io::Error },
+}
+
+/// Whether a name is one of a folder, and leads nowhere else.
+pub fn checked(name: &str) -> Result<&str, KeepError> {
+    let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(ordinary) {
+        return Err(KeepError::Name(name.chars().take(MAX_NAME).collect()));
+    }
+    Ok(name)
+}
+
+/// Writes a run into a folder of its own below `out`; a taken name gets a number.
+pub fn keep(
+    live: &Live,
+    mode: Mode,
+    out: &Path,
+    name: &str,
+) -> Result<(PathBuf, SavedState), KeepError> {
+    let folder = folder::create_below(out, checked(name)?)?;
+    let at = |name: &str| folder.join(name);
+    let write = |name: &str, text: String| {
+        let path = at(name);
+        std::fs::write(&path, text).map_err(|source| KeepError::Write { path, source })
+    };
+    write("scene.toml", to_toml(&live.plan.scene))?;
+    let table = at("series.csv");
+    SeriesWriter::create(&table, &live.plan)
+        .and_then(|mut series| live.rows.iter().try_for_each(|row| series.write(row)))
+        .map_err(|source| KeepError::Write { path: table, source })?;
+    let recording = at("recording.rrd");
+    let folder_name = folder.file_name().map(|n| n.to_string_lossy().into_owned());
+    let mut info = live.info.clone();
+    info.name = folder_name.clone().unwrap_or(info.name);
+    // The schedule has grown since the run began.
+    info.scene_toml = to_toml(&live.plan.scene);
+    let mut log = RerunLog::open(&info, &[Sink::Save(recording.clone())])?;
+    live.film.frames().iter().try_for_each(|frame| log.frame(frame))?;
+    log.finish()?;
+    let mut tally = Tally { wall: live.seconds(), ..live.tally.clone() };
+    tally.warnings.extend(live.run.warnings().iter().map(ToString::to_string));
+    let ending = match mode {
+        Mode::Finished => Ending::Finished,
+        Mode::Failed => Ending::Failed,
+        _ => Ending::Interrupted,
+    };
+    let summary = Summary::new(
+        live.run.as_ref(),
+        &tally,
+        ending,
+        folder.display().to_string(),
+        Some(recording.display().to_string()),
+    );
+    let json = serde_json::to_string_pretty(&summary).unwrap_or_default();
+    write("summary.json", format!("{json}\n"))?;
+    plots_of_run(&folder, &live.plan, &live.rows)?;
+    let files = folder::FILES.iter().filter_map(|name| {
+        let size = std::fs::metadata(at(name)).ok()?.len();
+        Some((name.to_string(), size))
+    });
+    let scene = at("scene.toml");
+    let saved = SavedState {
+        name: folder_name.unwrap_or_default(),
+        steps: summary.steps,
+        state_hash: summary.state_hash,
+        command: format!("grainscope run {} --steps {}", scene.display(), summary.steps),
+        files: files.collect(),
+    };
+    Ok((folder, saved))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lead_nowhere_else() {
+        for name in ["a", "silo-2", "my_run", "5"] {
+            assert!(checked(name).is_ok(), "{name}");
+        }
+        for name in ["", ".", "..", "../a", "a/b", "a\\b", "a b", "C:", "a\0", "ä", &"a".repeat(65)]
+        {
+            assert!(checked(name).is_err(), "{name}");
+        }
+    }
+}

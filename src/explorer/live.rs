@@ -1,0 +1,221 @@
+//! A run with all that was seen of it.
+
+use super::board::{self, Board};
+use super::draft::{Draft, quantity};
+use super::film::Film;
+use super::protocol::Change;
+use crate::frame::{Frame, RunInfo};
+use crate::plan::{Plan, When};
+use crate::record::info;
+use crate::record::summary::Tally;
+use crate::scene::SceneError;
+use crate::sim::row::{Phases, Row};
+use crate::sim::{self, Run, SimError, picture};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Pictures come no closer together than this while running.
+const PICTURE_EVERY: Duration = Duration::from_millis(150);
+/// Drawing takes at most this share of the time.
+const PICTURE_SHARE: f64 = 0.2;
+/// Steps that means are taken over.
+const MEAN_OVER: usize = 20;
+
+/// What turning a knob would do.
+pub enum Turn {
+    /// It takes effect with a step to come, by this plan.
+    Live(Box<Plan>, u64),
+    /// It needs a run of its own, because of this.
+    Restart(String),
+}
+
+/// See the module.
+pub struct Live {
+    pub id: u64,
+    pub draft: Draft,
+    /// Of the draft: what a new run would be.
+    pub values: Plan,
+    pub run: Box<dyn Run>,
+    pub plan: Arc<Plan>,
+    pub info: RunInfo,
+    pub film: Film,
+    pub rows: Vec<Row>,
+    pub tally: Tally,
+    pub changes: Vec<Change>,
+    frames: usize,
+    /// Spent on steps so far.
+    computing: Duration,
+    drawn: Option<Instant>,
+    drawing: Duration,
+    /// Ends of the last steps.
+    ends: VecDeque<Instant>,
+}
+
+impl Live {
+    /// Solves the first instant.
+    pub fn start(id: u64, draft: Draft, plan: Plan, board: &Board) -> Result<Live, SimError> {
+        let plan = Arc::new(plan);
+        let clock = Instant::now();
+        let run = sim::start(plan.clone())?;
+        let mut warnings: Vec<String> = plan.warnings.iter().map(ToString::to_string).collect();
+        let every = picture::thinning(&plan, picture::drawn(&plan, run.particles()).len());
+        if every > 1 {
+            warnings.push(crate::plan::Warning::ParticlesThinned { every }.to_string());
+        }
+        board.begin(id, board::columns(&plan));
+        let mut info = info::run_info(&plan, &plan.scene.name);
+        info.recording_id = format!("{}-{id}", info.recording_id);
+        Ok(Live {
+            id,
+            draft,
+            values: Plan::clone(&plan),
+            info,
+            film: Film::default(),
+            rows: vec![],
+            tally: Tally::new(run.row(), warnings),
+            changes: vec![],
+            frames: 0,
+            computing: clock.elapsed(),
+            drawn: None,
+            drawing: Duration::ZERO,
+            ends: VecDeque::new(),
+            run,
+            plan,
+        })
+    }
+
+    /// Takes a step. What happened in it is in the events of the run.
+    pub fn step(&mut self) -> Result<(), SimError> {
+        let clock = Instant::now();
+        self.run.step()?;
+        self.computing += clock.elapsed();
+        if self.ends.len() > MEAN_OVER {
+            self.ends.pop_front();
+        }
+        self.ends.push_back(Instant::now());
+        let (step, time) = (self.run.row().step, self.run.row().time);
+        for change in self.changes.iter_mut().filter(|c| c.step == step) {
+            change.time = Some(time);
+        }
+        // Those of the scene's own schedule are told when they happen.
+        for event in self.run.events() {
+            let label = event.split_once(": ").map_or(event.as_str(), |e| e.1).to_string();
+            if !self.changes.iter().any(|c| c.step == step) {
+                self.changes.push(Change { step, time: Some(time), label });
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the present instant down; `draw` wants a picture of it however short ago the last
+    /// one was.
+    pub fn observe(&mut self, draw: bool, board: &Board) -> Arc<Frame> {
+        let row = self.run.row().clone();
+        self.tally.add(&row);
+        let mut notes = self.run.events().to_vec();
+        if row.step == 0 {
+            notes.extend(self.tally.warnings.iter().cloned());
+        }
+        let wanted = self.plan.frame_is_due(row.time, &mut self.frames);
+        let draw = draw || wanted || self.run.is_finished() || self.picture_is_due();
+        let picture = draw.then(|| self.draw());
+        let wall = self.computing.as_secs_f64();
+        let frame = Arc::new(info::frame(&self.plan, &row, wall, picture, notes));
+        self.film.push(frame.clone(), wanted);
+        board.add(self.id, board::point(&row));
+        self.rows.push(row);
+        frame
+    }
+
+    /// A picture of the present instant, if the last frame has none.
+    pub fn look(&mut self) -> Option<Arc<Frame>> {
+        if self.film.ends_in_a_picture() {
+            return None;
+        }
+        let picture = Some(self.draw());
+        let wall = self.computing.as_secs_f64();
+        let row = self.run.row();
+        let (step, time_s) = (row.step, row.time);
+        let frame = Frame { step, time_s, wall_s: wall, picture, ..Default::default() };
+        let frame = Arc::new(frame);
+        self.film.push(frame.clone(), false);
+        Some(frame)
+    }
+
+    fn draw(&mut self) -> crate::frame::Picture {
+        let clock = Instant::now();
+        let picture = self.run.picture();
+        self.drawing = clock.elapsed();
+        self.drawn = Some(Instant::now());
+        picture
+    }
+
+    fn picture_is_due(&self) -> bool {
+        let pause = PICTURE_EVERY.max(self.drawing.div_f64(PICTURE_SHARE));
+        self.drawn.is_none_or(|last| last.elapsed() >= pause)
+    }
+
+    /// What turning a knob would do, and the draft with it turned.
+    pub fn turn(&self, key: &str, value: &str) -> Result<(Draft, Plan, Turn), SceneError> {
+        let draft = self.draft.with(key, value)?;
+        let values = draft.plan()?;
+        if let Some(what) = self.values.beyond_matter(&values) {
+            return Ok((draft, values, Turn::Restart(format!("it changes {what}"))));
+        }
+        let step = self.run.row().step + 1;
+        let set = [(key.trim().to_string(), quantity(value))].into_iter().collect();
+        let turn = match self.plan.with_change(self.run.changes_applied(), step, &set) {
+            Ok(plan) => Turn::Live(Box::new(plan), step),
+            Err(e) => Turn::Restart(e.message().to_string()),
+        };
+        Ok((draft, values, turn))
+    }
+
+    /// Goes on by another plan, made by [`Live::turn`].
+    pub fn go_on(&mut self, draft: Draft, values: Plan, plan: Plan, step: u64) {
+        self.draft = draft;
+        self.values = values;
+        self.plan = Arc::new(plan);
+        self.run.replan(self.plan.clone());
+        self.changes.retain(|c| c.step < step);
+        let entry = self.plan.changes.iter().find(|c| c.when == When::Step(step));
+        let label = entry.map_or(String::new(), |c| c.label.clone());
+        self.changes.push(Change { step, time: None, label });
+    }
+
+    /// Standing still does not count as slow.
+    pub fn paused(&mut self) {
+        self.ends.clear();
+    }
+
+    pub fn steps_per_second(&self) -> Option<f64> {
+        let (first, last) = (self.ends.front()?, self.ends.back()?);
+        let span = last.duration_since(*first).as_secs_f64();
+        (self.ends.len() > 1 && span > 0.0).then(|| (self.ends.len() - 1) as f64 / span)
+    }
+
+    /// The last steps; row 0 sets everything up and counts only while it is alone.
+    fn last(&self) -> &[Row] {
+        let from = self.rows.len().saturating_sub(MEAN_OVER).max(1);
+        self.rows.get(from..).filter(|r| !r.is_empty()).unwrap_or(&self.rows)
+    }
+
+    /// Seconds by phase of the last steps, all together.
+    pub fn phases(&self) -> Phases {
+        let mut sum = Phases::default();
+        self.last().iter().for_each(|r| sum.add(&r.seconds));
+        sum
+    }
+
+    /// Seconds that a step takes: the median of the last ones.
+    pub fn usual_step(&self) -> f64 {
+        let mut walls: Vec<f64> = self.last().iter().map(|r| r.wall).collect();
+        walls.sort_by(f64::total_cmp);
+        walls.get(walls.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+
+    pub fn seconds(&self) -> f64 {
+        self.computing.as_secs_f64()
+    }
+}

@@ -1,0 +1,276 @@
+//! The page over HTTP, to this machine only.
+//!
+//! Every path starts with the token; requests must name this machine as host, and come from no
+//! other site. Pages name scenes and files from lists of the session, never paths. Bodies,
+//! headers and connections are limited.
+
+use super::board::Board;
+use super::protocol::{Answer, Command};
+use super::session::Request as Order;
+use crate::record::rerun_log::{ViewerFile, viewer_file};
+use axum::Router;
+use axum::body::{Body, Bytes};
+use axum::extract::{DefaultBodyLimit, Path, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use crossbeam::channel::Sender;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use std::convert::Infallible;
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::{Semaphore, oneshot};
+
+/// Largest body of a command, bytes.
+const MAX_BODY: usize = 16 * 1024;
+/// Largest head of a request, bytes.
+const MAX_HEAD: usize = 32 * 1024;
+/// Connections at a time.
+const MAX_CONNECTIONS: usize = 128;
+/// How long the head of a request may take.
+const HEAD_PATIENCE: Duration = Duration::from_secs(10);
+/// How long a stream of states may be silent.
+const HEARTBEAT: Duration = Duration::from_secs(10);
+
+const PAGE: &str = include_str!("../../assets/explorer/index.html");
+const STYLE: &str = include_str!("../../assets/explorer/style.css");
+const SCRIPT: &str = include_str!("../../assets/explorer/explorer.js");
+const PLOTS: &str = include_str!("../../assets/explorer/plots.js");
+const VIEWER: &str = include_str!("../../assets/explorer/viewer.html");
+const VIEWER_SCRIPT: &str = include_str!("../../assets/explorer/viewer.js");
+const ICON: &str = include_str!("../../assets/explorer/icon.svg");
+
+/// What pages may load and do: nothing that is not from here, but for the recording's data.
+const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
+    style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; \
+    connect-src 'self' http://127.0.0.1:*; frame-src 'self'; worker-src 'self' blob:; \
+    frame-ancestors 'self'; base-uri 'none'; form-action 'none'";
+
+/// What is served, and to whom.
+pub struct Site {
+    pub port: u16,
+    pub token: String,
+    pub commands: Sender<Order>,
+    pub board: Arc<Board>,
+}
+
+type Shared = State<Arc<Site>>;
+
+/// Serves until the program ends.
+pub fn serve(listener: TcpListener, site: Site) {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let outcome = runtime.and_then(|r| r.block_on(accept(listener, routes(Arc::new(site)))));
+    if let Err(e) = outcome {
+        eprintln!("error: the page is not served any more: {e}");
+    }
+}
+
+async fn accept(listener: TcpListener, routes: Router) -> std::io::Result<()> {
+    listener.set_nonblocking(true)?;
+    let listener = tokio::net::TcpListener::from_std(listener)?;
+    let places = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+    loop {
+        let place = places.clone().acquire_owned().await;
+        let Ok((stream, _)) = listener.accept().await else {
+            // Too many open files, or a connection that was given up: others may still come.
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            continue;
+        };
+        let service = TowerToHyperService::new(routes.clone());
+        let serving = hyper::server::conn::http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(HEAD_PATIENCE)
+            .max_buf_size(MAX_HEAD)
+            .serve_connection(TokioIo::new(stream), service);
+        tokio::spawn(async move {
+            // A connection that breaks is its client's affair.
+            let _ = serving.await;
+            drop(place);
+        });
+    }
+}
+
+fn routes(site: Arc<Site>) -> Router {
+    const HTML: &str = "text/html; charset=utf-8";
+    const JS: &str = "text/javascript; charset=utf-8";
+    let text = |kind: &'static str, text: &'static str| {
+        get(move || async move { ([(header::CONTENT_TYPE, kind)], text) })
+    };
+    let viewer = |kind: &'static str, file: ViewerFile| {
+        get(move || async move {
+            match viewer_file(file) {
+                Some(bytes) => {
+                    ([(header::CONTENT_TYPE, kind)], Bytes::from_static(bytes)).into_response()
+                }
+                None => StatusCode::NOT_FOUND.into_response(),
+            }
+        })
+    };
+    let inside = Router::new()
+        .route("/", text(HTML, PAGE))
+        .route("/style.css", text("text/css; charset=utf-8", STYLE))
+        .route("/explorer.js", text(JS, SCRIPT))
+        .route("/plots.js", text(JS, PLOTS))
+        .route("/icon.svg", text("image/svg+xml", ICON))
+        .route("/viewer/", text(HTML, VIEWER))
+        .route("/viewer/viewer.js", text(JS, VIEWER_SCRIPT))
+        .route("/viewer/re_viewer.js", viewer(JS, ViewerFile::Script))
+        .route("/viewer/re_viewer_bg.wasm", viewer("application/wasm", ViewerFile::Program))
+        .route("/api/state", get(state))
+        .route("/api/events", get(events))
+        .route("/api/curves", get(curves))
+        .route("/api/sketch", get(sketch))
+        .route("/api/command", post(command))
+        .route("/api/saved/{folder}/{file}", get(saved));
+    // A router inside another does not match its own root with a slash at the end.
+    let root = format!("/{}", site.token);
+    let mut all = Router::new().route(&format!("{root}/"), text(HTML, PAGE));
+    all = all.nest(&root, inside);
+    all.layer(DefaultBodyLimit::max(MAX_BODY))
+        .layer(from_fn_with_state(site.clone(), guard))
+        .with_state(site)
+}
+
+/// Refuses whoever is not a page of this program, and says to browsers what its pages may do.
+async fn guard(State(site): Shared, request: Request, next: Next) -> Response {
+    let mut response = match admit(&site, &request) {
+        Ok(()) => next.run(request).await,
+        Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
+    };
+    let headers = response.headers_mut();
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::X_FRAME_OPTIONS, "SAMEORIGIN"),
+        (header::CACHE_CONTROL, "no-store"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+fn admit(site: &Site, request: &Request) -> Result<(), &'static str> {
+    let headers = request.headers();
+    let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", site.port));
+    let text = |name: HeaderName| headers.get(name).map(|v| v.to_str().unwrap_or("?"));
+    if !text(header::HOST).is_some_and(|host| hosts.iter().any(|h| h == host)) {
+        return Err("this page is served under the name of this machine only\n");
+    }
+    let ours = |origin: &str| hosts.iter().any(|h| origin.strip_prefix("http://") == Some(h));
+    if text(header::ORIGIN).is_some_and(|origin| !ours(origin)) {
+        return Err("requests of other sites are refused\n");
+    }
+    let given = request.uri().path().split('/').nth(1).unwrap_or_default();
+    if !same(given, &site.token) {
+        return Err("the address lacks the token that grainscope printed\n");
+    }
+    Ok(())
+}
+
+/// Compares without telling by its duration how much is right.
+fn same(a: &str, b: &str) -> bool {
+    let differ = a.bytes().zip(b.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+    a.len() == b.len() && differ == 0
+}
+
+fn json(text: impl Into<Body>) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], text.into()).into_response()
+}
+
+async fn state(State(site): Shared) -> Response {
+    let text = site.board.watch().borrow().to_string();
+    json(text)
+}
+
+/// The state now and whenever it changes, as server-sent events.
+async fn events(State(site): Shared) -> Response {
+    let mut receiver = site.board.watch();
+    receiver.mark_changed();
+    let stream = futures::stream::unfold(receiver, |mut receiver| async move {
+        let text = match tokio::time::timeout(HEARTBEAT, receiver.changed()).await {
+            Ok(Ok(())) => format!("data: {}\n\n", receiver.borrow_and_update().as_ref()),
+            Ok(Err(_)) => return None,
+            Err(_) => ": still here\n\n".to_string(),
+        };
+        Some((Ok::<_, Infallible>(Bytes::from(text)), receiver))
+    });
+    ([(header::CONTENT_TYPE, "text/event-stream")], Body::from_stream(stream)).into_response()
+}
+
+/// `?run=<id>&from=<point>`
+async fn curves(State(site): Shared, uri: Uri) -> Response {
+    let number = |name: &str| -> Option<u64> {
+        let pairs = uri.query().unwrap_or_default().split('&');
+        pairs.filter_map(|p| p.split_once('=')).find(|p| p.0 == name)?.1.parse().ok()
+    };
+    let from = number("from").and_then(|f| usize::try_from(f).ok()).unwrap_or(0);
+    let part = number("run").and_then(|run| site.board.part(run, from));
+    match part.map(|p| serde_json::to_string(&p)) {
+        Some(Ok(text)) => json(text),
+        _ => (StatusCode::NOT_FOUND, "there is no such run\n").into_response(),
+    }
+}
+
+async fn sketch(State(site): Shared) -> Response {
+    match site.board.drawn().map(|s| serde_json::to_string(&s)) {
+        Some(Ok(text)) => json(text),
+        _ => (StatusCode::NOT_FOUND, "there is no picture yet\n").into_response(),
+    }
+}
+
+async fn command(State(site): Shared, headers: HeaderMap, body: Bytes) -> Response {
+    let refuse = |code: StatusCode, answer: Answer| {
+        let text = serde_json::to_string(&answer).unwrap_or_default();
+        (code, [(header::CONTENT_TYPE, "application/json")], text).into_response()
+    };
+    // Forms of other sites cannot send this type.
+    let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok());
+    if !kind.is_some_and(|k| k.starts_with("application/json")) {
+        let answer = Answer::no("a command is JSON", "send it as application/json");
+        return refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, answer);
+    }
+    let command: Command = match serde_json::from_slice(&body) {
+        Ok(command) => command,
+        Err(e) => {
+            let answer = Answer::no(format!("this is no command: {e}"), "");
+            return refuse(StatusCode::BAD_REQUEST, answer);
+        }
+    };
+    let (reply, answer) = oneshot::channel();
+    if site.commands.try_send(Order { command, reply }).is_err() {
+        let answer = Answer::no("the session takes no more commands", "wait for the step to end");
+        return refuse(StatusCode::SERVICE_UNAVAILABLE, answer);
+    }
+    match answer.await {
+        Ok(answer) => refuse(StatusCode::OK, answer),
+        Err(_) => {
+            let answer = Answer::no("the session has ended", "start grainscope again");
+            refuse(StatusCode::SERVICE_UNAVAILABLE, answer)
+        }
+    }
+}
+
+/// A file of a run that was saved in this session.
+async fn saved(State(site): Shared, Path((folder, file)): Path<(String, String)>) -> Response {
+    let path = site.board.file(&folder, &file);
+    let bytes = path.and_then(|path| std::fs::read(path).ok());
+    let Some(bytes) = bytes else {
+        return (StatusCode::NOT_FOUND, "there is no such file\n").into_response();
+    };
+    let kind = match file.rsplit('.').next() {
+        Some("svg") => "image/svg+xml",
+        Some("png") => "image/png",
+        Some("json") => "application/json",
+        Some("csv") => "text/csv; charset=utf-8",
+        Some("toml") => "text/plain; charset=utf-8",
+        _ => "application/octet-stream",
+    };
+    let name = format!("attachment; filename=\"{folder}-{file}\"");
+    ([(header::CONTENT_TYPE, kind.to_string()), (header::CONTENT_DISPOSITION, name)], bytes)
+        .into_response()
+}

@@ -1,0 +1,38 @@
+//! A run and those that were kept before it, side by side on one time cursor.
+
+use std::sync::Arc;
+
+use super::sinks::{Destinations, Sink};
+use super::{RecordError, RerunLog, blueprint};
+use crate::frame::{Frame, RunInfo};
+
+/// A run and what there is of it so far.
+pub struct Lane<'a> {
+    /// Its name must differ from those beside it.
+    pub info: &'a RunInfo,
+    /// In order.
+    pub frames: &'a [Arc<Frame>],
+}
+
+impl RerunLog {
+    /// Starts a recording of a run that goes on, beside others that do not.
+    pub fn beside(others: &[Lane], run: &Lane, sinks: &[Sink]) -> Result<Self, RecordError> {
+        let mut to = Destinations::open(sinks)?;
+        let rec = to.begin(&run.info.recording_id)?;
+        let infos: Vec<&RunInfo> = others.iter().chain([run]).map(|lane| lane.info).collect();
+        blueprint::send_stage(&rec, &infos)?;
+        rec.send_recording_name(run.info.name.as_str())?;
+        for lane in others {
+            let mut log = Self::of(rec.clone(), lane.info);
+            log.constant(lane.info)?;
+            log.replay(lane)?;
+        }
+        let mut log = Self::of(rec, run.info).towards(to, run.info)?;
+        log.replay(run)?;
+        Ok(log)
+    }
+
+    fn replay(&mut self, lane: &Lane) -> Result<(), RecordError> {
+        lane.frames.iter().try_for_each(|frame| self.frame(frame))
+    }
+}

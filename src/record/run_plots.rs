@@ -1,0 +1,65 @@
+//! The plots that every run leaves.
+
+use super::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_plot};
+use crate::plan::Plan;
+use crate::sim::row::Row;
+use std::path::Path;
+
+/// Writes the plots of a run into its folder: what flowed out, alignment, balances.
+pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), PlotError> {
+    let time = || Axis::new("time", "s");
+    let curve = |name: &str, value: &dyn Fn(&Row) -> f64| Curve {
+        name: name.into(),
+        points: rows.iter().map(|r| (r.time, value(r))).collect(),
+        marks: false,
+    };
+    let title = &plan.scene.name;
+    let gauges = &plan.gauges;
+    if !gauges.is_empty() {
+        let of = |value: &dyn Fn(&Row, usize) -> f64| -> Vec<Curve> {
+            (0..gauges.len()).map(|k| curve(&gauges[k].name, &|r| value(r, k))).collect()
+        };
+        panels_plot(
+            &folder.join("outflow"),
+            &[
+                PlotSpec {
+                    title: format!("{title}: volume that has flowed out"),
+                    x: time(),
+                    y: Axis::new("outflow volume", "m²"),
+                    curves: of(&|r, k| r.gauges[k].volume),
+                },
+                PlotSpec {
+                    title: "rate of outflow".into(),
+                    x: time(),
+                    y: Axis::new("outflow rate", "m²/s"),
+                    curves: of(&|r, k| r.gauges[k].rate),
+                },
+            ],
+        )?;
+    }
+    if plan.effects.directors {
+        line_plot(
+            &folder.join("alignment"),
+            &PlotSpec {
+                title: format!("{title}: alignment of the directors"),
+                x: time(),
+                y: Axis::new("mean |n_x|", ""),
+                curves: vec![curve("mean |n_x|", &|r| r.alignment.unwrap_or(f64::NAN))],
+            },
+        )?;
+    }
+    line_plot(
+        &folder.join("diagnostics"),
+        &PlotSpec {
+            title: format!("{title}: balances"),
+            x: time(),
+            y: Axis::new("relative error", "").log(),
+            curves: vec![
+                curve("power", &|r| r.power_error),
+                curve("divergence", &|r| r.divergence_error),
+                curve("volume", &|r| r.volume_error),
+            ],
+        },
+    )?;
+    Ok(())
+}

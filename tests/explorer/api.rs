@@ -1,0 +1,356 @@
+//! Commands and their answers, and who is refused.
+
+use super::http::request;
+use super::{Explorer, PATIENCE, program};
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+/// A silo that takes some milliseconds a step.
+const SMALL: [&str; 4] = ["silo", "--set", "accuracy.cells=2", "--paused"];
+
+fn set(key: &str, value: &str) -> Value {
+    json!({ "do": "set", "key": key, "value": value })
+}
+
+#[test]
+fn changes_on_the_way_are_repeated_to_the_bit() {
+    let explorer = Explorer::open(&SMALL);
+    explorer.steps(3);
+    assert!(explorer.set("alpha", "2").ends_with("takes effect with step 4"));
+    explorer.steps(1);
+    // Several changes between two steps, one of them taken back.
+    explorer.set("gravity[1]", "-30");
+    explorer.set("contrast", "100");
+    explorer.set("gravity[1]", "-5");
+    explorer.steps(2);
+    explorer.set("alpha", "5/3");
+    explorer.steps(1);
+    explorer.set("materials.grains.density", "2e6");
+    explorer.steps(2);
+    let state = explorer.state();
+    let steps: Vec<_> = state["run"]["changes"].as_array().expect("a list").iter().collect();
+    assert_eq!(steps.len(), 4, "{steps:?}");
+    assert!(steps.iter().all(|c| c["time"].is_number()), "{steps:?}");
+    explorer.repeats_headless("kept");
+    let scene = std::fs::read_to_string(explorer.path("runs/kept/scene.toml")).expect("a scene");
+    assert_eq!(scene.matches("[[schedule]]").count(), 4, "{scene}");
+    // Not noticed if the last change waits for a step that is not taken.
+    explorer.set("alpha", "0.01");
+    explorer.repeats_headless("waiting");
+    // And on from there.
+    explorer.steps(1);
+    explorer.repeats_headless("after");
+}
+
+#[test]
+fn changes_while_running_are_repeated_to_the_bit() {
+    let explorer = Explorer::open(&["silo", "--set", "accuracy.cells=2"]);
+    for (step, alpha) in [(3, "1"), (6, "10"), (9, "0.1")] {
+        explorer.wait_for("step", |s| s["run"]["step"].as_u64() >= Some(step));
+        explorer.set("alpha", alpha);
+    }
+    explorer.wait_for("step", |s| s["run"]["step"].as_u64() >= Some(14));
+    explorer.repeats_headless("kept");
+}
+
+#[test]
+fn other_scenes_repeat_too() {
+    // Directors; a stable stratification, in which gravity sets how long steps may be.
+    for (scene, key, values) in [
+        ("shear_alignment", "materials.layers.layer_viscosity", ["0.05", "0.2"]),
+        ("rayleigh_taylor", "gravity[1]", ["-20", "5"]),
+        ("hydrostatic", "gravity[1]", ["-20", "-5"]),
+    ] {
+        let explorer = Explorer::open(&[scene, "--set", "accuracy.cells=8", "--paused"]);
+        explorer.steps(2);
+        for value in values {
+            let key = match explorer.ask(set(key, value)) {
+                answer if answer["accepted"] == json!(true) => key,
+                answer => panic!("{scene}: {answer}"),
+            };
+            assert!(!key.is_empty());
+            explorer.steps(2);
+        }
+        explorer.repeats_headless("kept");
+    }
+}
+
+#[test]
+fn a_change_comes_between_those_of_the_scene_itself() {
+    let silo = program().args(["presets", "show", "silo"]).output().expect("starts");
+    let silo = String::from_utf8(silo.stdout).expect("text");
+    let scene = format!(
+        "{silo}\n[[schedule]]\ntime = 2e-5\nset = {{ contrast = 500 }}\n\n\
+         [[schedule]]\ntime = 8e-5\nset = {{ contrast = 100 }}\n"
+    );
+    let explorer = Explorer::beside(
+        &[("mine.toml", &scene)],
+        &["mine.toml", "--set", "accuracy.cells=2", "--paused"],
+    );
+    while explorer.state()["run"]["time"].as_f64() < Some(4e-5) {
+        explorer.steps(1);
+    }
+    explorer.set("alpha", "3");
+    while explorer.state()["run"]["time"].as_f64() < Some(1e-4) {
+        explorer.steps(1);
+    }
+    let state = explorer.state();
+    let labels: Vec<_> = state["run"]["changes"].as_array().expect("a list").iter().collect();
+    let labels: Vec<_> = labels.iter().map(|c| c["label"].as_str().expect("text")).collect();
+    assert_eq!(labels, ["contrast = 500", "alpha = 3", "contrast = 100"]);
+    explorer.repeats_headless("kept");
+}
+
+#[test]
+fn what_a_change_does_is_said_before_and_when_it_is_made() {
+    let explorer = Explorer::open(&SMALL);
+    explorer.steps(2);
+    for (key, value, says) in [
+        ("alpha", "0.5", "takes effect with step 3"),
+        ("alpha", "0", "restarts: it changes the set of solved effects"),
+        ("accuracy.cells", "3", "restarts: it changes the mesh"),
+        ("aperture", "1.1", "restarts: it changes the mesh"),
+        ("fill_height", "6", "restarts: it changes what fills the domain at first"),
+        ("accuracy.tolerance", "1e-8", "restarts: it changes the accuracy"),
+        ("time.end", "5e-3", "restarts: it changes times of the run"),
+        ("boundaries.top.kind", "open", "restarts: it changes the boundaries"),
+    ] {
+        let answer = explorer.ask(json!({ "do": "ask", "key": key, "value": value }));
+        assert_eq!(answer["message"], json!(says), "{key}");
+        assert_eq!(answer["restarts"], json!(says.starts_with("restarts")), "{key}");
+    }
+    assert_eq!(explorer.state()["run"]["step"], json!(2), "asking changes nothing");
+    for (key, value, says) in [
+        ("alpha", "-1", "min"),
+        ("alpha", "much", "unknown name"),
+        ("alpah", "1", "there is no parameter"),
+        ("alpha", "", "no value"),
+        ("", "1", "not a key"),
+        ("schema", "7", "schema"),
+    ] {
+        let answer = explorer.ask(set(key, value));
+        assert_eq!(answer["accepted"], json!(false), "{key}: {answer}");
+        let all = answer.to_string();
+        assert!(all.contains(says), "{key}: {all}");
+        assert!(answer["remedy"].is_string(), "{key}: {all}");
+    }
+    assert_eq!(explorer.state()["run"]["step"], json!(2), "what is refused changes nothing");
+    let said = explorer.set("alpha", "0");
+    assert_eq!(said, "alpha = 0; restarted: it changes the set of solved effects");
+    let state = explorer.state();
+    assert_eq!(state["run"]["step"], json!(0));
+    assert_eq!(state["mode"], json!("paused"));
+    let rotation = state["effects"].as_array().expect("a list").iter();
+    let rotation = rotation.clone().find(|e| e["name"] == json!("Cosserat rotation"));
+    assert_eq!(rotation.expect("told")["solved"], json!(false));
+    // The way back: what the switch offers.
+    let switch = state["switches"][0].clone();
+    assert_eq!((&switch["key"], &switch["on"]), (&json!("alpha"), &json!(false)));
+    explorer.set("alpha", switch["other"].as_str().expect("text"));
+    assert_eq!(explorer.state()["switches"][0]["on"], json!(true));
+}
+
+#[test]
+fn more_internal_length_slows_the_discharge() {
+    let explorer = Explorer::open(&SMALL);
+    let rate = || explorer.state()["run"]["readings"][0]["value"].as_f64().expect("a number");
+    explorer.steps(2);
+    let before = rate();
+    explorer.set("alpha", "1");
+    explorer.steps(1);
+    assert!(rate() < 0.99 * before, "{before} {}", rate());
+}
+
+#[test]
+fn transport() {
+    let explorer = Explorer::open(&SMALL);
+    assert_eq!(explorer.state()["mode"], json!("paused"));
+    assert_eq!(explorer.tell(json!({ "do": "step" })), "step 1");
+    explorer.tell(json!({ "do": "run" }));
+    explorer.wait_for("step 4", |s| s["run"]["step"].as_u64() >= Some(4));
+    explorer.tell(json!({ "do": "pause" }));
+    let step = explorer.state()["run"]["step"].clone();
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(explorer.state()["run"]["step"], step, "a run that stands stands");
+    explorer.tell(json!({ "do": "stop" }));
+    assert_eq!(explorer.state()["mode"], json!("stopped"));
+    assert_eq!(explorer.ask(json!({ "do": "step" }))["accepted"], json!(false));
+    explorer.tell(json!({ "do": "restart" }));
+    explorer.wait_for("a new run", |s| {
+        s["mode"] == json!("running") && s["run"]["step"].as_u64() < step.as_u64()
+    });
+}
+
+#[test]
+fn pins_keep_what_was() {
+    let explorer = Explorer::open(&SMALL);
+    explorer.steps(3);
+    explorer.tell(json!({ "do": "pin", "name": "soft" }));
+    let again = explorer.ask(json!({ "do": "pin", "name": "soft" }));
+    assert_eq!(again["accepted"], json!(false));
+    let before = explorer.state()["stream"].clone();
+    explorer.set("alpha", "0");
+    let state = explorer.state();
+    assert_ne!(state["stream"], before, "another recording");
+    let pin = state["pins"][0].clone();
+    assert_eq!((&pin["name"], &pin["steps"]), (&json!("soft"), &json!(3)));
+    let curves = explorer.get(&format!("api/curves?run={}&from=1", pin["id"])).json();
+    assert_eq!(curves["points"].as_array().map(Vec::len), Some(3));
+    assert_eq!(
+        curves["points"][0].as_array().map(Vec::len),
+        curves["columns"].as_array().map(Vec::len)
+    );
+    explorer.tell(json!({ "do": "unpin", "name": "soft" }));
+    assert_eq!(explorer.state()["pins"], json!([]));
+    assert_eq!(explorer.get(&format!("api/curves?run={}", pin["id"])).code, 404);
+}
+
+#[test]
+fn saved_files_can_be_fetched_and_nothing_else() {
+    let explorer = Explorer::open(&SMALL);
+    explorer.steps(2);
+    explorer.tell(json!({ "do": "save", "name": "kept" }));
+    explorer.tell(json!({ "do": "save", "name": "kept" }));
+    let saved = explorer.state()["saved"].clone();
+    assert_eq!((&saved[0]["name"], &saved[1]["name"]), (&json!("kept-2"), &json!("kept")));
+    let recording = explorer.get("api/saved/kept/recording.rrd");
+    assert_eq!((recording.code, recording.body.get(..3)), (200, Some(b"RRF".as_slice())));
+    for name in ["scene.toml", "series.csv", "summary.json", "outflow.svg", "diagnostics.png"] {
+        let file = explorer.get(&format!("api/saved/kept/{name}"));
+        let there = std::fs::read(explorer.path("runs/kept").join(name)).expect("a file");
+        assert_eq!((file.code, file.body), (200, there), "{name}");
+    }
+    for path in [
+        "api/saved/kept/..%2f..%2fmine.toml",
+        "api/saved/../../../etc/passwd",
+        "api/saved/%2e%2e/%2e%2e",
+        "api/saved/kept/%2fetc%2fpasswd",
+        "api/saved/other/scene.toml",
+        "../../../../etc/passwd",
+    ] {
+        let code = explorer.get(path).code;
+        assert!(code == 404 || code == 403 || code == 400, "{path}: {code}");
+    }
+    for name in ["../up", "/tmp/up", "a/b", "", "..", "con fusion"] {
+        let answer = explorer.ask(json!({ "do": "save", "name": name }));
+        assert_eq!(answer["accepted"], json!(false), "{name}");
+    }
+    for scene in ["../secret.toml", "file:../secret.toml", "/etc/passwd", "file:/etc/passwd"] {
+        let answer = explorer.ask(json!({ "do": "load", "scene": scene }));
+        assert_eq!(answer["accepted"], json!(false), "{scene}");
+        assert!(!answer.to_string().contains("root:"), "{answer}");
+    }
+}
+
+#[test]
+fn strangers_are_refused() {
+    let explorer = Explorer::open(&SMALL);
+    let (port, page) = (explorer.port(), explorer.below(""));
+    let state = explorer.below("api/state");
+    let code = |path: &str, headers: &[(&str, &str)]| request(port, "GET", path, headers, b"").code;
+    assert_eq!(code(&page, &[]), 200);
+    assert_eq!(code(&page, &[("Host", &format!("localhost:{port}"))]), 200);
+    let own = format!("http://127.0.0.1:{port}");
+    assert_eq!(code(&state, &[("Origin", &own)]), 200);
+    // Without the token, or with half of it.
+    for path in ["/", "/api/state", "/0123456789abcdef0123456789abcdef/api/state", &state[2..]] {
+        let path = if path.starts_with('/') { path.to_string() } else { format!("/{path}") };
+        assert_eq!(code(&path, &[]), 403, "{path}");
+    }
+    // Names that others resolve to this machine, and pages of other sites.
+    for host in ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1.evil.example", ""] {
+        assert_eq!(code(&state, &[("Host", host)]), 403, "{host}");
+    }
+    for origin in ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"] {
+        assert_eq!(code(&state, &[("Origin", origin)]), 403, "{origin}");
+    }
+    let post = |headers: &[(&str, &str)], body: &[u8]| {
+        request(port, "POST", &explorer.below("api/command"), headers, body).code
+    };
+    let json = ("Content-Type", "application/json");
+    let run = br#"{"do":"run"}"#;
+    assert_eq!(post(&[json, ("Origin", "http://evil.example")], run), 403);
+    assert_eq!(post(&[("Content-Type", "text/plain")], run), 415);
+    assert_eq!(post(&[], run), 415);
+    assert_eq!(post(&[json], b"{"), 400);
+    assert_eq!(post(&[json], br#"{"do":"exec","path":"/bin/sh"}"#), 400);
+    assert_eq!(post(&[json], &vec![b' '; 1 << 20]), 413);
+    assert_eq!(explorer.state()["mode"], json!("paused"), "nothing of this was heard");
+    let long = "x".repeat(1 << 20);
+    let refused = code(&state, &[("X-Long", &long)]);
+    assert!(refused == 431 || refused == 400 || refused == 0, "{refused}");
+    assert_eq!(code(&page, &[]), 200, "and it still serves");
+    let head = request(port, "GET", &page, &[], b"").head.to_ascii_lowercase();
+    for header in ["content-security-policy: default-src 'none'", "x-content-type-options: nosniff"]
+    {
+        assert!(head.contains(header), "{head}");
+    }
+}
+
+#[test]
+fn a_scene_with_errors_says_where_and_leaves_the_run() {
+    let explorer = Explorer::beside(
+        &[
+            ("broken.toml", "schema = 1\nname = \"broken\"\ngravty = [0, -10]\n"),
+            ("notes.toml", "a = 1\n"),
+        ],
+        &SMALL,
+    );
+    explorer.steps(1);
+    let scenes = explorer.state()["scenes"].to_string();
+    assert!(scenes.contains("file:broken.toml"), "{scenes}");
+    assert!(!scenes.contains("notes.toml"), "{scenes}");
+    let answer = explorer.ask(json!({ "do": "load", "scene": "file:broken.toml" }));
+    assert_eq!(answer["accepted"], json!(false));
+    let state = explorer.state();
+    let fault = state["problem"]["faults"][0].clone();
+    assert!(fault["message"].as_str().expect("text").contains("broken.toml:3"), "{fault}");
+    assert_eq!(fault["line"], json!([3, "gravty = [0, -10]"]));
+    assert!(fault["remedy"].as_str().expect("text").contains("gravity"), "{fault}");
+    assert_eq!((&state["title"], &state["run"]["step"]), (&json!("silo"), &json!(1)));
+    // It may be mended and tried again; what is right takes its place.
+    let scene = program().args(["presets", "show", "solcx"]).output().expect("starts").stdout;
+    std::fs::write(explorer.path("broken.toml"), scene).expect("written");
+    explorer.tell(json!({ "do": "load", "scene": "file:broken.toml" }));
+    let state = explorer.state();
+    assert_eq!((&state["title"], &state["problem"]), (&json!("solcx"), &Value::Null));
+}
+
+#[test]
+fn opens_with_a_broken_scene_and_without_any_run() {
+    let broken = [("broken.toml", "schema = 1\nname = 3\n")];
+    let explorer = Explorer::beside(&broken, &["broken.toml"]);
+    let state = explorer.state();
+    assert_eq!(state["mode"], json!("empty"));
+    assert!(state["problem"].to_string().contains("broken.toml:2"), "{state}");
+    assert_eq!(explorer.ask(json!({ "do": "step" }))["accepted"], json!(false));
+    explorer.tell(json!({ "do": "load", "scene": "preset:solcx" }));
+    assert_eq!(explorer.state()["title"], json!("solcx"));
+}
+
+#[test]
+fn quits_when_asked() {
+    let mut explorer = Explorer::open(&SMALL);
+    explorer.tell(json!({ "do": "quit" }));
+    let clock = Instant::now();
+    loop {
+        if let Some(status) = explorer.child.try_wait().expect("known") {
+            assert!(status.success());
+            break;
+        }
+        assert!(clock.elapsed() < PATIENCE);
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn a_taken_port_and_an_unknown_scene_are_refused() {
+    let explorer = Explorer::open(&SMALL);
+    let port = explorer.port().to_string();
+    let said = explorer.grainscope(&["explore", "silo", "--port", &port]);
+    assert_eq!(said.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&said.stderr).contains("0 takes any free port"));
+    let said = explorer.grainscope(&["explore", "silos"]);
+    assert_eq!(said.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&said.stderr).contains("did you mean `silo`"));
+}

@@ -1,0 +1,249 @@
+//! The page in a real browser, as a newcomer meets it.
+
+use super::Explorer;
+use super::webdriver::{Browser, ENTER, RIGHT, TAB};
+use serde_json::json;
+use std::path::Path;
+
+/// Long enough for browsers that draw without a graphics card.
+const SMALL: [&str; 6] = ["silo", "--set", "accuracy.cells=2", "--set", "time.end=1", "--paused"];
+/// The grains, and the paper they are drawn on.
+const GRAINS: [u8; 3] = [230, 159, 0];
+const STEP: &str = "Number(document.querySelector('#numbers dd').textContent)";
+
+/// Rate of outflow as the page shows it.
+fn rate(browser: &Browser) -> f64 {
+    let text = browser.text("#numbers");
+    let after = text.split("outflow rate").nth(1).expect("a rate");
+    let number = after.split_whitespace().next().expect("a number");
+    number.parse().unwrap_or_else(|_| panic!("{number} in {text}"))
+}
+
+fn type_into(browser: &Browser, css: &str, text: &str) {
+    let field = browser.find(css);
+    field.clear();
+    field.write(text);
+}
+
+/// Waits until the viewer shows the recording that the session speaks of.
+fn viewer_shows(browser: &Browser) {
+    browser.wait_for(
+        "picture",
+        "state && state.stream && document.body.dataset.showing === state.stream.recording",
+    );
+}
+
+#[test]
+fn a_newcomer_in_five_minutes() {
+    let Some(browser) = Browser::start([1280, 720], false) else { return };
+    let broken = "schema = 1\nname = \"broken\"\ngravty = [0, -10]\n";
+    let explorer = Explorer::beside(&[("broken.toml", broken)], &SMALL);
+    browser.go(&explorer.url);
+
+    // A sketch at first; two steps by the keyboard.
+    browser.wait_for("sketch", "sketched !== null || document.body.dataset.showing");
+    browser.wait_for("knobs", "state.knobs.length > 0");
+    for step in 1..=2 {
+        browser.press("s");
+        browser.wait_for("step", &format!("{STEP} === {step}"));
+    }
+
+    // More internal length, less outflow: said first, then done.
+    let before = rate(&browser);
+    type_into(&browser, "#knob-alpha", "2");
+    browser.wait_for(
+        "forecast",
+        "document.querySelector('[data-knob=alpha] .says').textContent.startsWith('takes effect')",
+    );
+    browser.find("#knob-alpha").write(ENTER);
+    browser.wait_for("change", "state.run.changes.length === 1");
+    browser.find("#step").click();
+    browser.wait_for("step", &format!("{STEP} === 3"));
+    let after = rate(&browser);
+    assert!(after < 0.97 * before, "{before} {after}");
+
+    // It runs, and stands when told to; the viewer draws the flow.
+    browser.script("document.activeElement.blur()", &[]);
+    browser.press(" ");
+    browser.wait_for("sixth step", &format!("{STEP} >= 6"));
+    browser.wait_for("curves", "document.querySelectorAll('#plots path.curve').length === 3");
+    browser.press(" ");
+    browser.wait_for("pause", "state.mode === 'paused'");
+    viewer_shows(&browser);
+    let clock = std::time::Instant::now();
+    loop {
+        let (colours, shares) = browser.colours("#viewer", &[GRAINS]);
+        if colours > 100 && shares[0] > 0.005 {
+            break;
+        }
+        assert!(clock.elapsed() < super::PATIENCE, "{colours} colours, {shares:?} grains");
+    }
+
+    // Keep it, and leave the rotation out: that is another run, beside the first.
+    type_into(&browser, "#pin-name", "stiff");
+    browser.find("#pin button").click();
+    browser.wait_for("pin", "state.pins.length === 1");
+    assert!(browser.text("#pins").contains("stiff"));
+    browser.find("[data-effect='Cosserat rotation']").click();
+    browser.wait_for("restart", &format!("{STEP} === 0 && !state.switches[0].on"));
+    assert!(browser.text("#toast").contains("restarted"), "{}", browser.text("#toast"));
+    browser.find("#run").click();
+    browser.wait_for("third step", &format!("{STEP} >= 3"));
+    viewer_shows(&browser);
+    browser.wait_for(
+        "second curve",
+        "document.querySelectorAll('#plots .plot:first-child path.curve').length === 2",
+    );
+
+    // A scene with errors says so, where, and what to do; the run is still there.
+    browser.script(
+        "const s = document.getElementById('scene'); s.value = 'file:broken.toml'; s.onchange({ target: s })",
+        &[],
+    );
+    browser.wait_for("problem", "!document.getElementById('problem').hidden");
+    let problem = browser.text("#problem");
+    for part in ["broken.toml:3", "gravty = [0, -10]", "did you mean `gravity`"] {
+        assert!(problem.contains(part), "no {part:?} in {problem}");
+    }
+    assert_eq!(explorer.state()["title"], json!("silo"));
+
+    // Another scene takes its place.
+    browser.script(
+        "const s = document.getElementById('scene'); s.value = 'preset:layer_stack'; s.onchange({ target: s })",
+        &[],
+    );
+    browser.wait_for(
+        "other scene",
+        "state.title === 'layer_stack' && document.getElementById('problem').hidden",
+    );
+    viewer_shows(&browser);
+
+    // Back to the silo; leave with a scene that reproduces it.
+    browser.script(
+        "const s = document.getElementById('scene'); s.value = 'preset:silo'; s.onchange({ target: s })",
+        &[],
+    );
+    browser.wait_for("silo", "state.title === 'silo'");
+    explorer.set("accuracy.cells", "2");
+    explorer.tell(json!({ "do": "run" }));
+    browser.wait_for("third step", &format!("state.run.cells[0] < 40 && {STEP} >= 3"));
+    explorer.set("alpha", "1");
+    browser.wait_for("sixth step", &format!("{STEP} >= 6"));
+    type_into(&browser, "#save-name", "mine");
+    browser.find("#save button").click();
+    browser.wait_for("saved run", "state.saved.length === 1");
+    assert!(browser.text("#saved").contains("recording.rrd"));
+    explorer.repeats_headless("again-mine");
+}
+
+#[test]
+fn two_tabs_show_the_same_and_may_be_closed() {
+    let Some(browser) = Browser::start([1280, 720], false) else { return };
+    let explorer = Explorer::open(&["silo", "--set", "accuracy.cells=2", "--paused"]);
+    browser.go(&explorer.url);
+    browser.wait_for("state", "state && state.knobs.length > 0");
+    let first = browser.window();
+    let second = browser.open_window(&explorer.url);
+    browser.wait_for("state", "state && state.knobs.length > 0");
+    browser.find("#step").click();
+    browser.wait_for("step", &format!("{STEP} === 1"));
+    browser.switch(&first);
+    browser.wait_for("step in the other tab", &format!("{STEP} === 1"));
+    browser.find("#run").click();
+    browser.wait_for("run", "state.mode === 'running'");
+    browser.switch(&second);
+    browser.wait_for("run in the other tab", "state.mode === 'running'");
+    browser.close_window();
+    browser.switch(&first);
+    browser.go("about:blank");
+    let step = explorer.state()["run"]["step"].as_u64();
+    explorer.wait_for("steps without a page", |s| s["run"]["step"].as_u64() > step.map(|n| n + 2));
+}
+
+#[test]
+fn controls_have_names_room_and_keys() {
+    for (size, dark) in [([1280, 720], false), ([1920, 1080], true)] {
+        let Some(browser) = Browser::start(size, dark) else { return };
+        let explorer = Explorer::open(&["silo", "--set", "accuracy.cells=2", "--paused"]);
+        browser.go(&explorer.url);
+        browser.wait_for("controls", "state && state.dial.length > 0 && state.switches.length > 0");
+        let nameless = browser.script(
+            "return [...document.querySelectorAll('button, input, select, iframe, svg, [role=group]')]
+               .filter((e) => !(e.getAttribute('aria-label') || e.textContent.trim() || e.title
+                 || (e.labels && [...e.labels].some((l) => l.textContent.trim()))))
+               .map((e) => e.outerHTML)",
+            &[],
+        );
+        assert_eq!(nameless, json!([]));
+        let wide = browser.script(
+            "const cut = [...document.querySelectorAll('aside *, header *')].filter((e) =>
+               e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML);
+             return [document.documentElement.scrollWidth <= innerWidth,
+               document.documentElement.scrollHeight <= innerHeight, cut]",
+            &[],
+        );
+        assert_eq!(wide, json!([true, true, []]));
+        let scheme = "matchMedia('(prefers-color-scheme: dark)').matches";
+        assert_eq!(browser.script(&format!("return {scheme}"), &[]), json!(dark));
+        // Every control can be reached, and turned, by keys.
+        let reached = (0..60)
+            .map(|_| {
+                browser.press(TAB);
+                browser
+                    .script("return document.activeElement.id || document.activeElement.type", &[])
+            })
+            .collect::<Vec<_>>();
+        for id in ["scene", "run", "step", "restart", "stop", "knob-alpha", "range", "pin-name"] {
+            assert!(reached.contains(&json!(id)), "{id} in {reached:?}");
+        }
+        browser.script("document.querySelector('[data-knob=alpha] [type=range]').focus()", &[]);
+        let alpha = "state.knobs[0].value";
+        let before = browser.script(&format!("return {alpha}"), &[]).as_f64().expect("a number");
+        browser.press(RIGHT);
+        browser.wait_for("change", &format!("{alpha} > {before}"));
+    }
+}
+
+/// Makes the pictures of the documentation: `assets/explorer/screenshots.sh`.
+#[test]
+#[ignore = "makes pictures"]
+fn pictures() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/explorer/pictures");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let save = |browser: &Browser, name: &str| {
+        // Software rendering takes its time.
+        std::thread::sleep(std::time::Duration::from_secs(15));
+        std::fs::write(folder.join(name), browser.picture()).expect("a file");
+    };
+    let cells = ["silo", "--set", "accuracy.cells=4"];
+    let scene = "schema = 1\nname = \"broken\"\ngravty = [0, -10]\n";
+    for (size, dark, end) in [([1280, 720], false, "light"), ([1920, 1080], true, "dark")] {
+        let Some(browser) = Browser::start(size, dark) else { return };
+        let explorer = Explorer::beside(&[("broken.toml", scene)], &cells);
+        browser.go(&explorer.url);
+        browser.wait_for("flow", "state && state.run.time > 1.42e-3");
+        explorer.tell(json!({ "do": "pause" }));
+        viewer_shows(&browser);
+        save(&browser, &format!("run-{end}.png"));
+        explorer.tell(json!({ "do": "pin", "name": "alpha = 1/3" }));
+        explorer.set("alpha", "10/3");
+        explorer.tell(json!({ "do": "restart" }));
+        explorer.tell(json!({ "do": "run" }));
+        browser.wait_for("flow", "state.run.step > 0 && state.run.time > 1.3e-3");
+        explorer.tell(json!({ "do": "pause" }));
+        viewer_shows(&browser);
+        save(&browser, &format!("beside-{end}.png"));
+        explorer.tell(json!({ "do": "save", "name": "silo" }));
+        browser.script("document.querySelector('aside').scrollTop = 1e6", &[]);
+        save(&browser, &format!("saved-{end}.png"));
+        explorer.ask(json!({ "do": "load", "scene": "file:broken.toml" }));
+        browser.script("document.querySelector('aside').scrollTop = 0", &[]);
+        save(&browser, &format!("broken-{end}.png"));
+        explorer.tell(json!({ "do": "load", "scene": "preset:shear_alignment" }));
+        explorer.tell(json!({ "do": "run" }));
+        browser.wait_for("flow", "state.title === 'shear_alignment' && state.run.time > 0.25");
+        explorer.tell(json!({ "do": "pause" }));
+        viewer_shows(&browser);
+        save(&browser, &format!("alignment-{end}.png"));
+    }
+}

@@ -1,0 +1,253 @@
+//! A browser driven over WebDriver: chromedriver and Chromium, where the machine has them.
+
+use super::http;
+use super::{PATIENCE, TempFolder};
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Key under which WebDriver names elements.
+const ELEMENT: &str = "element-6066-11e4-a52e-4f735466cecf";
+
+/// Keys that are not letters.
+pub const ENTER: &str = "\u{e007}";
+pub const TAB: &str = "\u{e004}";
+pub const RIGHT: &str = "\u{e014}";
+
+pub struct Browser {
+    driver: Child,
+    port: u16,
+    session: String,
+    _profile: TempFolder,
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        http::request(self.port, "DELETE", &format!("/session/{}", self.session), &[], b"");
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}
+
+/// A page, or a part of one.
+pub struct Element<'a> {
+    browser: &'a Browser,
+    id: String,
+}
+
+impl Browser {
+    /// `None` where there is no browser, which is said.
+    pub fn start([width, height]: [u32; 2], dark: bool) -> Option<Browser> {
+        let skipped = |why: &str| {
+            eprintln!("SKIPPED: {why}; install chromium and chromium-driver to test the page");
+            None
+        };
+        let name = std::env::var("CHROMEDRIVER").unwrap_or("chromedriver".into());
+        let driver =
+            Command::new(name).arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let Ok(mut driver) = driver else { return skipped("there is no chromedriver") };
+        let out = driver.stdout.take().expect("piped");
+        let port = BufReader::new(out).lines().map_while(Result::ok).find_map(|line| {
+            line.split_once("successfully on port ")?.1.trim_end_matches('.').parse().ok()
+        });
+        let Some(port) = port else { return skipped("chromedriver does not start") };
+        let profile = TempFolder::new().expect("a folder");
+        let mut arguments = vec![
+            "--headless=new".to_string(),
+            "--no-sandbox".into(),
+            "--use-gl=angle".into(),
+            "--use-angle=swiftshader".into(),
+            "--enable-unsafe-swiftshader".into(),
+            "--disable-background-networking".into(),
+            "--disable-component-update".into(),
+            "--disable-sync".into(),
+            "--no-first-run".into(),
+            "--hide-scrollbars".into(),
+            format!("--window-size={width},{height}"),
+            format!("--user-data-dir={}", profile.path().display()),
+        ];
+        if dark {
+            arguments.push("--blink-settings=preferredColorScheme=0".into());
+        }
+        let wanted = json!({ "capabilities": { "alwaysMatch": {
+            "goog:chromeOptions": { "args": arguments },
+            "unhandledPromptBehavior": "accept",
+        } } });
+        let reply = http::request(port, "POST", "/session", &[], wanted.to_string().as_bytes());
+        let Some(session) = reply.json()["value"]["sessionId"].as_str().map(String::from) else {
+            let _ = driver.kill();
+            return skipped(&format!("no browser can be started: {}", reply.text()));
+        };
+        let browser = Browser { driver, port, session, _profile: profile };
+        // Drawing without a graphics card holds scripts up.
+        let most = PATIENCE.as_millis() as u64;
+        browser.command("POST", "/timeouts", json!({ "script": most, "pageLoad": most }));
+        // The window's frame takes room, the page is to have all that was asked for.
+        let size = browser.script("return [innerWidth, innerHeight]", &[]);
+        let lack = |k: usize, wanted: u32| {
+            u64::from(wanted) - size[k].as_u64().unwrap_or(0).min(u64::from(wanted))
+        };
+        let (dx, dy) = (lack(0, width), lack(1, height));
+        let rect = json!({ "width": u64::from(width) + dx, "height": u64::from(height) + dy });
+        browser.command("POST", "/window/rect", rect);
+        Some(browser)
+    }
+
+    #[track_caller]
+    fn command(&self, method: &str, path: &str, body: Value) -> Value {
+        let path = format!("/session/{}{path}", self.session);
+        let text = if method == "GET" { String::new() } else { body.to_string() };
+        let reply = http::request(self.port, method, &path, &[], text.as_bytes());
+        let value = reply.json()["value"].clone();
+        assert!(value["error"].is_null(), "{path}: {value}");
+        value
+    }
+
+    pub fn go(&self, url: &str) {
+        self.command("POST", "/url", json!({ "url": url }));
+    }
+
+    /// The value of a script in the page.
+    #[track_caller]
+    pub fn script(&self, script: &str, arguments: &[Value]) -> Value {
+        self.command("POST", "/execute/sync", json!({ "script": script, "args": arguments }))
+    }
+
+    /// The same for one that answers later, through its last argument.
+    #[track_caller]
+    pub fn later(&self, script: &str, arguments: &[Value]) -> Value {
+        self.command("POST", "/execute/async", json!({ "script": script, "args": arguments }))
+    }
+
+    #[track_caller]
+    pub fn find(&self, css: &str) -> Element<'_> {
+        let found =
+            self.command("POST", "/element", json!({ "using": "css selector", "value": css }));
+        let id = found[ELEMENT].as_str().expect("an element").into();
+        Element { browser: self, id }
+    }
+
+    /// Types into whatever has the focus.
+    pub fn press(&self, keys: &str) {
+        let actions: Vec<Value> = keys
+            .chars()
+            .flat_map(|k| {
+                ["keyDown", "keyUp"].map(|t| json!({ "type": t, "value": k.to_string() }))
+            })
+            .collect();
+        let body = json!({ "actions": [{ "type": "key", "id": "keys", "actions": actions }] });
+        self.command("POST", "/actions", body);
+    }
+
+    pub fn text(&self, css: &str) -> String {
+        let script = "const e = document.querySelector(arguments[0]); return e ? e.innerText : ''";
+        self.script(script, &[json!(css)]).as_str().unwrap_or_default().into()
+    }
+
+    #[track_caller]
+    pub fn wait_for(&self, what: &str, condition: &str) -> Value {
+        let clock = Instant::now();
+        loop {
+            let value = self.script(&format!("return {condition}"), &[]);
+            if value != json!(false) && !value.is_null() {
+                return value;
+            }
+            if clock.elapsed() > PATIENCE {
+                let focus =
+                    self.script("return document.activeElement.outerHTML.slice(0, 80)", &[]);
+                panic!("no {what}: {condition}; focus on {focus}\n{}", self.text("main"));
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+
+    /// Opens a page in a window of its own, and goes there.
+    pub fn open_window(&self, url: &str) -> String {
+        let window = self.command("POST", "/window/new", json!({ "type": "tab" }));
+        let handle = window["handle"].as_str().expect("a window").to_string();
+        self.switch(&handle);
+        self.go(url);
+        handle
+    }
+
+    pub fn window(&self) -> String {
+        self.command("GET", "/window", json!({})).as_str().expect("a window").into()
+    }
+
+    pub fn switch(&self, window: &str) {
+        self.command("POST", "/window", json!({ "handle": window }));
+    }
+
+    pub fn close_window(&self) {
+        self.command("DELETE", "/window", json!({}));
+    }
+
+    /// The page as PNG.
+    pub fn picture(&self) -> Vec<u8> {
+        decoded(self.command("GET", "/screenshot", json!({})).as_str().unwrap_or_default())
+    }
+
+    /// Share of the pixels of an element that look like each of some colours, within a tenth, and
+    /// how many colours there are at all.
+    pub fn colours(&self, css: &str, wanted: &[[u8; 3]]) -> (usize, Vec<f64>) {
+        let path = format!("/element/{}/screenshot", self.find(css).id);
+        let png = self.command("GET", &path, json!({}));
+        let script = "const [png, wanted, done] = arguments; const image = new Image();
+            image.onload = () => {
+              const canvas = document.createElement('canvas');
+              [canvas.width, canvas.height] = [image.width, image.height];
+              const pen = canvas.getContext('2d'); pen.drawImage(image, 0, 0);
+              const data = pen.getImageData(0, 0, image.width, image.height).data;
+              const all = new Set(), counts = wanted.map(() => 0);
+              for (let k = 0; k < data.length; k += 4) {
+                all.add((data[k] << 16) | (data[k + 1] << 8) | data[k + 2]);
+                wanted.forEach((w, i) => {
+                  if ([0, 1, 2].every((c) => Math.abs(data[k + c] - w[c]) < 26)) counts[i]++;
+                });
+              }
+              done([all.size, counts.map((n) => 4 * n / data.length)]);
+            };
+            image.src = 'data:image/png;base64,' + png;";
+        let found = self.later(script, &[png, json!(wanted)]);
+        let shares = found[1].as_array().expect("shares").iter();
+        let count = found[0].as_u64().unwrap_or(0);
+        (count as usize, shares.map(|s| s.as_f64().unwrap_or(0.0)).collect())
+    }
+}
+
+impl Element<'_> {
+    #[track_caller]
+    pub fn click(&self) {
+        self.browser.command("POST", &format!("/element/{}/click", self.id), json!({}));
+    }
+
+    #[track_caller]
+    pub fn clear(&self) {
+        self.browser.command("POST", &format!("/element/{}/clear", self.id), json!({}));
+    }
+
+    #[track_caller]
+    pub fn write(&self, text: &str) {
+        let path = format!("/element/{}/value", self.id);
+        self.browser.command("POST", &path, json!({ "text": text }));
+    }
+}
+
+fn decoded(base64: &str) -> Vec<u8> {
+    let digit = |c: u8| match c {
+        b'A'..=b'Z' => c - b'A',
+        b'a'..=b'z' => c - b'a' + 26,
+        b'0'..=b'9' => c - b'0' + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let digits: Vec<u8> = base64.bytes().filter(|c| *c != b'=').map(digit).collect();
+    let mut out = vec![];
+    for four in digits.chunks(4) {
+        let bits =
+            four.iter().fold(0u32, |all, d| all << 6 | u32::from(*d)) << (6 * (4 - four.len()));
+        out.extend(&bits.to_be_bytes()[1..four.len()]);
+    }
+    out
+}
