@@ -184,7 +184,7 @@ pub fn price(
     let noise = survey.base()?;
     let base = survey.ran[0].sample.clone();
     let mut gauges = vec![];
-    let whole = if horizon < full { survey.to_the_end(source, &scene, &pilot)? } else { None };
+    let whole = if horizon < full { survey.run_to_the_end(source, &scene, &pilot)? } else { None };
     survey.growth = whole.map(|w| w.0);
     let reference = match exact {
         Some(exact) => {
@@ -319,7 +319,7 @@ impl Survey<'_> {
 
     /// What shortening leaves out, seen on two coarse meshes that run to the end as well: how errors
     /// grow, and how many times longer whole runs take. `None` if there is no time for it.
-    fn to_the_end(
+    fn run_to_the_end(
         &mut self,
         source: &SceneSource,
         scene: &Scene,
