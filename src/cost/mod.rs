@@ -10,6 +10,7 @@
 //! self-made reference ([`mod@reference`]), and what no other candidate beats in both error and time
 //! is the front ([`front`]). [`effects`] prices what a scene calls for. [`list`] is what is printed, kept and bought from.
 
+mod coarse;
 pub mod effects;
 pub mod front;
 pub mod knobs;

@@ -1,8 +1,9 @@
 //! Making a price list: what is run, in which order, and when it is enough.
 
 use super::CostError;
+use super::coarse::Coarse;
 use super::front::{self, Offer, Power};
-use super::knobs::{Design, cells_near, rung};
+use super::knobs::{Design, rung};
 use super::list::{
     Entry, GaugeLine, Growth, KnobLine, List, Machine, Noise, ReferenceLine, SCHEMA,
 };
@@ -76,12 +77,13 @@ const REPEATS: [(f64, usize); 3] = [(0.1, 5), (0.4, 3), (1.0, 2)];
 /// Seeds whose spread is the sampling error.
 const SEEDS: [u64; 3] = [11, 12, 13];
 
+/// Runs that take less than this many times a base are shortened less.
+const LONG: f64 = 20.0;
+
 /// Fewest steps of a shortened run.
 const LEAST_STEPS: f64 = 6.0;
 
-/// Cells of the coarse meshes that run to the end, relative to the scene's own, and the share of
-/// the time that may be spent on them.
-const COARSE: [f64; 2] = [1.0 / 3.0, 0.5];
+/// Share of the time that may be spent on coarse runs to the end.
 const COARSE_SHARE: f64 = 0.25;
 
 /// Errors below this are rounding.
@@ -110,7 +112,7 @@ struct Survey<'a> {
 }
 
 /// Plans a source with sets.
-fn planned(source: &SceneSource, sets: &[String]) -> Result<Arc<Plan>, CostError> {
+pub(super) fn planned(source: &SceneSource, sets: &[String]) -> Result<Arc<Plan>, CostError> {
     let source = source.with_sets(sets)?;
     Ok(Arc::new(resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?))
 }
@@ -144,14 +146,24 @@ pub fn price(
     let scene = parse(source)?;
     let plan = planned(source, &[])?;
     let target = Target::of(&scene).map_err(|e| e.with_source(source))?;
-    let limits = effort.limits();
+    let mut limits = effort.limits();
     let full = scene.time.end.eval(&Scope::new(&scene)?)?;
     let pilot = Pilot::run(plan.clone(), 0.5 * limits.base)?;
+    let coarse = if target.at != Moment::Start && pilot.whole() > limits.base {
+        Coarse::run(source, &scene, &target, &pilot, COARSE_SHARE * limits.total)?
+    } else {
+        None
+    };
+    let whole_seconds = coarse.as_ref().map_or(1.0, |c| c.forecast) * pilot.whole();
+    if whole_seconds < LONG * limits.base {
+        // What coarse runs to the end take of longer ones is left for longer horizons.
+        limits.base *= 2.0;
+    }
     let mut horizon = full;
     let mut short = source.clone();
     let mut cuts = vec![];
-    if target.at != Moment::Start && pilot.whole() > limits.base {
-        let share = (limits.base - pilot.start) / (pilot.whole() - pilot.start);
+    if target.at != Moment::Start && whole_seconds > limits.base {
+        let share = (limits.base - pilot.start) / (whole_seconds - pilot.start);
         // Fewer steps are all start.
         let least = LEAST_STEPS / pilot.steps.max(LEAST_STEPS);
         let (sets, end) = shortened(&scene, share.max(least))?;
@@ -167,7 +179,7 @@ pub fn price(
         scene.name,
         target.title(),
         design.knobs.len(),
-        pilot.whole()
+        whole_seconds
     ));
     let mut survey = Survey {
         source: short,
@@ -184,7 +196,10 @@ pub fn price(
     let noise = survey.base()?;
     let base = survey.ran[0].sample.clone();
     let mut gauges = vec![];
-    let whole = if horizon < full { survey.run_to_the_end(source, &scene, &pilot)? } else { None };
+    let whole = match &coarse {
+        Some(coarse) if horizon < full => survey.beyond(coarse)?,
+        _ => None,
+    };
     survey.growth = whole.map(|w| w.0);
     let reference = match exact {
         Some(exact) => {
@@ -205,7 +220,7 @@ pub fn price(
     let whole_run = match (whole, survey.target.at) {
         (Some((_, ratio)), _) => ratio,
         (None, Moment::End | Moment::Peak) if horizon == full => 1.0,
-        _ => pilot.whole() / base.took.cpu.max(1e-9),
+        _ => whole_seconds / base.took.cpu.max(1e-9),
     };
     let names = plan.gauges.iter().map(|g| g.name.clone());
     let gauge_lines = names
@@ -317,42 +332,15 @@ impl Survey<'_> {
         Ok(noise)
     }
 
-    /// What shortening leaves out, seen on two coarse meshes that run to the end as well: how errors
-    /// grow, and how many times longer whole runs take. `None` if there is no time for it.
-    fn run_to_the_end(
-        &mut self,
-        source: &SceneSource,
-        scene: &Scene,
-        pilot: &Pilot,
-    ) -> Result<Option<(Growth, f64)>, CostError> {
-        let cells = COARSE.map(|f| cells_near(scene.accuracy.cells, f));
-        // Cells count to the power two, and once more for the steps.
-        let guess: f64 = COARSE.iter().map(|f| f.powf(2.5)).sum::<f64>() * pilot.whole();
-        if cells[0] == cells[1] || guess > COARSE_SHARE * self.limits.total {
-            return Ok(None);
+    /// What shortening leaves out, by coarse runs: how errors grow, and how many times longer whole
+    /// runs take.
+    fn beyond(&mut self, coarse: &Coarse) -> Result<Option<(Growth, f64)>, CostError> {
+        let mut near = vec![];
+        for n in coarse.cells {
+            near.extend(self.sample(&format!("cells {n}"), &[format!("accuracy.cells={n}")])?);
         }
-        let short = self.source.clone();
-        let mut found: Vec<[Sample; 2]> = vec![];
-        for n in cells {
-            let sets = [format!("accuracy.cells={n}")];
-            let label = format!("to the end with {n} cells");
-            let near = self.sample(&label, &sets)?;
-            self.source = source.clone();
-            let far = self.sample(&label, &sets);
-            self.source = short.clone();
-            let (Some(near), Some(far)) = (near, far?) else { return Ok(None) };
-            (self.say)(&format!("  {label}: {:.3} s of processor", far.took.cpu));
-            found.push([near, far]);
-        }
-        let difference = |k: usize| {
-            let [a, b] = [&found[0][k].value, &found[1][k].value];
-            let scale = self.target.size(b.iter().copied()).max(self.target.floor);
-            self.target.distance(a, b, scale)
-        };
-        let (near, far) = (difference(0), difference(1));
-        let factor = if near > ROUNDING { far / near } else { 1.0 };
-        let ratio = found[1][1].took.cpu / found[1][0].took.cpu.max(1e-9);
-        Ok(Some((Growth { factor, cells }, ratio)))
+        let [rough, fine] = &near[..] else { return Ok(None) };
+        Ok(Some(coarse.beyond([rough, fine], &self.target)))
     }
 
     /// The reference where nothing is exact: a coarser and a finer rung beside the scene's own.

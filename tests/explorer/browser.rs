@@ -211,8 +211,8 @@ fn pictures() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/explorer/pictures");
     std::fs::create_dir_all(&folder).expect("a folder");
     let save = |browser: &Browser, name: &str| {
-        // Software rendering takes its time.
-        std::thread::sleep(std::time::Duration::from_secs(15));
+        // Software rendering takes its time, and lags behind the run meanwhile.
+        std::thread::sleep(std::time::Duration::from_secs(30));
         std::fs::write(folder.join(name), browser.picture()).expect("a file");
     };
     let cells = ["silo", "--set", "accuracy.cells=4"];
@@ -222,7 +222,7 @@ fn pictures() {
         let explorer = Explorer::beside(&[("broken.toml", scene)], &cells);
         browser.go(&explorer.url);
         browser.wait_for("flow", "state && state.run.time > 1.42e-3");
-        explorer.tell(json!({ "do": "pause" }));
+        explorer.ask(json!({ "do": "pause" }));
         viewer_shows(&browser);
         save(&browser, &format!("run-{end}.png"));
         explorer.tell(json!({ "do": "pin", "name": "alpha = 1/3" }));
@@ -230,7 +230,7 @@ fn pictures() {
         explorer.tell(json!({ "do": "restart" }));
         explorer.tell(json!({ "do": "run" }));
         browser.wait_for("flow", "state.run.step > 0 && state.run.time > 1.3e-3");
-        explorer.tell(json!({ "do": "pause" }));
+        explorer.ask(json!({ "do": "pause" }));
         viewer_shows(&browser);
         save(&browser, &format!("beside-{end}.png"));
         explorer.tell(json!({ "do": "save", "name": "silo" }));
@@ -242,7 +242,7 @@ fn pictures() {
         explorer.tell(json!({ "do": "load", "scene": "preset:shear_alignment" }));
         explorer.tell(json!({ "do": "run" }));
         browser.wait_for("flow", "state.title === 'shear_alignment' && state.run.time > 0.25");
-        explorer.tell(json!({ "do": "pause" }));
+        explorer.ask(json!({ "do": "pause" }));
         viewer_shows(&browser);
         save(&browser, &format!("alignment-{end}.png"));
     }
