@@ -211,8 +211,8 @@ fn pictures() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/explorer/pictures");
     std::fs::create_dir_all(&folder).expect("a folder");
     let save = |browser: &Browser, name: &str| {
-        // Software rendering takes its time, and lags behind the run meanwhile.
-        std::thread::sleep(std::time::Duration::from_secs(30));
+        // Software rendering takes its time, and lags far behind the run meanwhile.
+        std::thread::sleep(std::time::Duration::from_secs(100));
         std::fs::write(folder.join(name), browser.picture()).expect("a file");
     };
     let cells = ["silo", "--set", "accuracy.cells=4"];
