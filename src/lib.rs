@@ -50,4 +50,5 @@ pub mod space;
 pub mod stress;
 #[doc(hidden)]
 pub mod testing;
+pub mod threads;
 pub mod verify;

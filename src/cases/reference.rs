@@ -76,7 +76,7 @@ fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
         });
     }
     let constraints = plan.boundary.constraints::<D>(mesh, &plan.units);
-    let mut stokes = Stokes::new(mesh.clone(), constraints)?;
+    let mut stokes = Stokes::new(mesh.clone(), constraints);
     let stopping =
         Stopping { tolerance: plan.method.tolerance, max_corrections: plan.method.max_corrections };
     let loads = Loads { nodal: &load, restoring: &Restoring::default() };

@@ -64,6 +64,9 @@ Examples:
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Threads that compute, by default one per processor; no result depends on them
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
 }
 
 #[derive(Subcommand)]
@@ -178,7 +181,26 @@ impl Failure {
 
 /// Reads the arguments, does what they say, and gives the exit code.
 pub fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    let Cli { command, threads } = Cli::parse();
+    let outcome = set_threads(threads).and_then(|()| run_command(command));
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            let code = failure.code();
+            failure.print();
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
+    let Some(n) = threads else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n));
+    pool.build_global().map_err(|e| Failure::Environment(format!("cannot start {n} threads: {e}")))
+}
+
+fn run_command(command: Command) -> Result<(), Failure> {
+    match command {
         Command::Run(args) => run::run(&args),
         Command::Explore(args) => explore::run(&args),
         Command::Plan(args) => plan::run(&args),
@@ -201,14 +223,6 @@ pub fn main() -> ExitCode {
                 Ok(()) => print(&String::from_utf8_lossy(&out)),
                 Err(e) => Err(Failure::Environment(e.to_string())),
             }
-        }
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            let code = failure.code();
-            failure.print();
-            ExitCode::from(code)
         }
     }
 }

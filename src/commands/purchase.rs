@@ -1,7 +1,7 @@
 //! `run --accuracy` and `run --budget`: settings bought from a price list.
 
 use super::{Failure, cost};
-use crate::cost::measure::Pilot;
+use crate::cost::measure::wall_of_a_step;
 use crate::cost::report::{percent, seconds};
 use crate::cost::{Entry, List};
 use crate::record::summary::Purchase;
@@ -99,16 +99,16 @@ pub fn buy(
 /// Seconds of a few steps.
 const PATIENCE: f64 = 0.5;
 
-/// How many times longer a step takes now than when the list was made: other work on the machine,
-/// another frequency.
+/// How many times longer a step takes now than a processor took when the list was made: other work
+/// on the machine, another frequency; more threads make it less.
 fn pace(source: &SceneSource, list: &List) -> Result<f64, Failure> {
     let Some(entry) = list.front().next() else { return Ok(1.0) };
     let (_, plan) = super::resolve(&source.with_sets(&entry.sets)?)?;
-    let now = Pilot::run(std::sync::Arc::new(plan), PATIENCE)?;
+    let now = wall_of_a_step(std::sync::Arc::new(plan), PATIENCE)?;
     let then = list.step_seconds(entry);
     // Of runs that are a start and little more, steps say nothing.
-    let known = now.step > 0.0 && then > 0.0 && entry.steps >= LEAST_STEPS;
-    Ok(if known { (now.step_wall / then).max(1.0) } else { 1.0 })
+    let known = now > 0.0 && then > 0.0 && entry.steps >= LEAST_STEPS;
+    Ok(if known { now / then } else { 1.0 })
 }
 
 /// Fewest steps of an entry that tell its pace.

@@ -4,7 +4,7 @@
 //! step in turn, and its share is `1 - (step without)/(step with)`, medians of processor time. One
 //! that drives the flow cannot be taken out; its share is that of its own stage.
 
-use super::measure::timed;
+use super::measure::{median, timed};
 use crate::plan::{EffectKind, EffectList, Plan, StepTime, resolve};
 use crate::scene::Scene;
 use crate::sim::row::Phases;
@@ -91,9 +91,7 @@ impl Timed {
 
     /// Median seconds of a step; not a number if the run was over at once.
     fn median(&self) -> f64 {
-        let mut s = self.seconds.clone();
-        s.sort_by(f64::total_cmp);
-        s.get(s.len() / 2).copied().unwrap_or(f64::NAN)
+        median(self.seconds.clone()).unwrap_or(f64::NAN)
     }
 }
 

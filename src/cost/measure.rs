@@ -4,6 +4,7 @@ use crate::plan::Plan;
 use crate::scene::{Interest, Interesting, Moment, Norm, Quantity, Scene, SceneError, Scope};
 use crate::sim::row::{Phases, Row};
 use crate::sim::{self, Run, SimError};
+use crate::threads;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -184,10 +185,11 @@ pub fn thread_seconds() -> Option<f64> {
     (ns > 0.0).then_some(ns * 1e-9)
 }
 
-/// Runs something and says what it took; without a clock of the processor its time is the wall's.
+/// Runs something on this thread alone and says what it took; without a clock of the processor its
+/// time is the wall's.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Took) {
     let (wall, cpu) = (Instant::now(), thread_seconds());
-    let result = work();
+    let result = threads::alone(work);
     let wall = wall.elapsed().as_secs_f64();
     let cpu = match (cpu, thread_seconds()) {
         (Some(before), Some(after)) => after - before,
@@ -232,14 +234,33 @@ pub fn run(
     })
 }
 
+/// The upper median, `None` of nothing.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Seconds of the wall that a step takes on all threads, judged from a few.
+pub fn wall_of_a_step(plan: Arc<Plan>, patience: f64) -> Result<f64, SimError> {
+    let clock = Instant::now();
+    let mut run = sim::start(plan)?;
+    let mut seconds = vec![];
+    while !run.is_finished()
+        && (seconds.len() < 3
+            || seconds.len() < PILOT_STEPS as usize && clock.elapsed().as_secs_f64() < patience)
+    {
+        run.step()?;
+        seconds.push(run.row().wall);
+    }
+    Ok(median(seconds).unwrap_or(0.0))
+}
+
 /// What a whole run would take, judged from its first steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Pilot {
     /// Seconds of set-up and first solution, of a processor.
     pub start: f64,
     pub step: f64,
-    /// Seconds of the wall for a step.
-    pub step_wall: f64,
     pub steps: f64,
 }
 
@@ -253,25 +274,20 @@ impl Pilot {
         let (run, start) = timed(|| sim::start(plan.clone()));
         let mut run = run?;
         let end = plan.clock.end * plan.units.time;
-        let (mut cpu, mut wall, mut count) = (vec![], vec![], 0);
+        let (mut cpu, mut count) = (vec![], 0);
         while !run.is_finished()
             && (count < 3 || count < PILOT_STEPS && clock.elapsed().as_secs_f64() < patience)
         {
             let (outcome, took) = timed(|| run.step());
             outcome?;
             cpu.push(took.cpu);
-            wall.push(took.wall);
             count += 1;
         }
         let row = run.row();
         let left = if row.dt > 0.0 { (end - row.time) / row.dt } else { 0.0 };
         // The first step solves twice; the median does not see it.
-        let median = |mut seconds: Vec<f64>| {
-            seconds.sort_by(f64::total_cmp);
-            seconds.get(seconds.len() / 2).copied().unwrap_or(0.0)
-        };
-        let (step, step_wall) = (median(cpu), median(wall));
-        Ok(Pilot { start: start.cpu, step, step_wall, steps: f64::from(count) + left.max(0.0) })
+        let step = median(cpu).unwrap_or(0.0);
+        Ok(Pilot { start: start.cpu, step, steps: f64::from(count) + left.max(0.0) })
     }
 
     /// Seconds of the whole run.

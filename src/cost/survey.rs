@@ -12,7 +12,6 @@ use super::reference::{Kind, Reference};
 use crate::cases::exact_of;
 use crate::plan::{Plan, resolve};
 use crate::scene::{Interesting, Moment, Placement, Scene, SceneSource, Scope, parse};
-use crate::sim::SimError;
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use std::sync::Arc;
 use std::time::Instant;
@@ -274,7 +273,6 @@ impl Survey<'_> {
         let plan = planned(&self.source, sets)?;
         match run(plan, &self.target, |_, _| {}) {
             Ok(sample) => Ok(Some(sample)),
-            Err(e @ SimError::Setup(_)) => Err(e.into()),
             Err(e) => {
                 (self.say)(&format!("  {label}: {e}"));
                 self.failed.push(format!("{label}: {e}"));

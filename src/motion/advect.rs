@@ -1,10 +1,38 @@
 //! Moving the particles: position, director, volume.
 
-use super::carrier::Carrier;
+use super::carrier::{CELL_GRAIN, Carrier};
 use super::gauges::Counter;
 use crate::plan::EffectSet;
 use crate::space::particles::Particles;
 use crate::space::population::Count;
+use crate::threads::{self, Divisible};
+
+/// Where a particle comes in a step, and what becomes of what it carries.
+#[derive(Clone, Copy, Default)]
+struct Moved {
+    /// Not wrapped around periodic sides.
+    to: [f64; 2],
+    left: bool,
+    held: bool,
+    director: [f64; 2],
+    stretch: f64,
+}
+
+/// The particles of some consecutive cells, to be moved.
+struct Members<'a> {
+    /// First particle of each of these cells and of the next.
+    start: &'a [u32],
+    moved: &'a mut [Moved],
+}
+
+impl Divisible for Members<'_> {
+    fn cut(self, at: usize) -> (Self, Self) {
+        let particles = (self.start[at] - self.start[0]) as usize;
+        let (a, b) = self.moved.split_at_mut(particles);
+        let (before, after) = (&self.start[..=at], &self.start[at..]);
+        (Members { start: before, moved: a }, Members { start: after, moved: b })
+    }
+}
 
 /// Moves all particles through a step. `particles` must be sorted; they are not afterwards.
 /// `compliant[m]`: volumes of material `m` follow the flow, and its particles keep their mass.
@@ -17,45 +45,52 @@ pub fn advance(
     count: &mut Count,
 ) {
     let mesh = carrier.mesh;
-    let mut left = Vec::new();
-    for cell in 0..mesh.cells() {
-        let members = particles.of_cell(cell);
-        if members.is_empty() {
-            continue;
-        }
-        for p in members {
-            let from = particles.position[p];
-            let journey = carrier.travel(cell, from);
-            count.held += u64::from(journey.held);
-            let material = particles.material[p];
-            let volume = particles.volume[p];
-            if effects.directors || effects.volume_change {
-                let l = carrier.gradient(journey.middle);
-                if let Some(director) = &mut particles.director {
-                    director[p] = carrier.turn(director[p], &l);
-                }
-                if compliant[material as usize] {
-                    let stretch = (l.trace() * carrier.dt).exp();
-                    particles.volume[p] *= stretch;
-                    if let Some(density) = &mut particles.density {
-                        density[p] /= stretch;
+    let turning = effects.directors || effects.volume_change;
+    let mut moved = vec![Moved::default(); particles.len()];
+    let members = Members { start: &particles.cell_start, moved: &mut moved };
+    threads::for_parts(members, 0..mesh.cells(), CELL_GRAIN, |cells, members| {
+        let first = members.start[0] as usize;
+        for cell in cells {
+            for p in particles.of_cell(cell) {
+                let journey = carrier.travel(cell, particles.position[p]);
+                let moved = &mut members.moved[p - first];
+                (moved.to, moved.left, moved.held) = (journey.to, journey.left, journey.held);
+                if turning {
+                    let l = carrier.gradient(journey.middle);
+                    if let Some(director) = &particles.director {
+                        moved.director = carrier.turn(director[p], &l);
+                    }
+                    if compliant[particles.material[p] as usize] {
+                        moved.stretch = (l.trace() * carrier.dt).exp();
                     }
                 }
             }
-            for gauge in gauges.iter_mut() {
-                gauge.pass(mesh, from, journey.to, material, volume);
-            }
-            if journey.left {
-                left.push(p);
-            } else {
-                particles.position[p] = mesh.wrap(journey.to);
+        }
+    });
+    for gauge in gauges {
+        for (p, moved) in moved.iter().enumerate() {
+            let (material, volume) = (particles.material[p], particles.volume[p]);
+            gauge.pass(mesh, particles.position[p], moved.to, material, volume);
+        }
+    }
+    for (p, moved) in moved.iter().enumerate() {
+        count.held += u64::from(moved.held);
+        if !moved.left {
+            particles.position[p] = mesh.wrap(moved.to);
+        }
+        if let (true, Some(director)) = (turning, &mut particles.director) {
+            director[p] = moved.director;
+        }
+        if turning && compliant[particles.material[p] as usize] {
+            particles.volume[p] *= moved.stretch;
+            if let Some(density) = &mut particles.density {
+                density[p] /= moved.stretch;
             }
         }
     }
-    if !left.is_empty() {
-        count.left += left.len() as u64;
-        let mut gone = vec![false; particles.len()];
-        left.iter().for_each(|&p| gone[p] = true);
+    if moved.iter().any(|m| m.left) {
+        let gone: Vec<bool> = moved.iter().map(|m| m.left).collect();
+        count.left += gone.iter().filter(|&&g| g).count() as u64;
         particles.remove(&gone);
     }
 }

@@ -4,7 +4,11 @@ use super::current::Current;
 use crate::laws::director;
 use crate::space::mesh::Mesh;
 use crate::space::walls::{Enclosure, Landing};
+use crate::threads;
 use nalgebra::Matrix2;
+
+/// Cells that are worth a task of their own.
+pub const CELL_GRAIN: usize = 64;
 
 /// A velocity field frozen at the middle of a step, and the walls in it.
 pub struct Carrier<'a> {
@@ -30,11 +34,12 @@ pub struct Journey {
 impl<'a> Carrier<'a> {
     /// `velocity`: at the nodes, of the middle of the step.
     pub fn new(mesh: &'a Mesh, enclosure: &'a Enclosure, velocity: &[[f64; 2]], dt: f64) -> Self {
-        let current = |cell| {
+        let mut currents = vec![Current::default(); mesh.cells()];
+        threads::for_each(&mut currents, CELL_GRAIN, |cell, current| {
             let nodal = mesh.cell_nodes(cell).map(|n| velocity[n]);
-            Current::new(&nodal, mesh.cell_size(cell))
-        };
-        Carrier { mesh, enclosure, dt, currents: (0..mesh.cells()).map(current).collect() }
+            *current = Current::new(&nodal, mesh.cell_size(cell));
+        });
+        Carrier { mesh, enclosure, dt, currents }
     }
 
     /// Velocity at a place reached from `p`, walls and periodic sides respected, and where it

@@ -33,7 +33,7 @@ use nalgebra::Matrix2;
 type Coefficients = [[f64; 4]; 3];
 
 /// Velocity in one cell, as polynomials of its reference coordinates.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Current {
     u: Coefficients,
     v: Coefficients,

@@ -26,7 +26,6 @@ use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
 use crate::scene::{Integrator, Quadrature as Rule};
 use crate::solve::buoyancy::{Ahead, Restoring};
-use crate::solve::cholesky::FactorError;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Loads, Report, SolveError, Stokes, Stopping};
 use crate::solve::weight::Weight;
@@ -45,8 +44,6 @@ use std::time::Instant;
 pub enum SimError {
     #[error(transparent)]
     Unfilled(#[from] Unfilled),
-    #[error("the solver could not be set up: {0}")]
-    Setup(#[from] FactorError),
     #[error("step {step}, t = {time:.6e} s: {source}")]
     Empty { step: u64, time: f64, source: EmptyCell },
     #[error("step {step}, t = {time:.6e} s: {source}")]
@@ -65,7 +62,6 @@ impl SimError {
     pub fn remedy(&self) -> &'static str {
         match self {
             SimError::Unfilled(_) => "see the message",
-            SimError::Setup(_) => "report this scene: the solver should accept every plan",
             SimError::Empty { .. } => {
                 "lower time.courant, raise accuracy.particles_per_cell, or give the scene a \
                  background material"
@@ -186,7 +182,7 @@ impl<const D: usize> Simulation<D> {
         let clock = Instant::now();
         let mesh = plan.mesh.clone();
         let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
-        let stokes = Stokes::new(mesh.clone(), constraints)?;
+        let stokes = Stokes::new(mesh.clone(), constraints);
         let population = Population::new(&mesh, &plan.enclosure, plan.method.seeding);
         let particles = initial::particles(&plan)?;
         let mut fixed_load = vec![[0.0; D]; mesh.nodes()];

@@ -409,62 +409,57 @@ pub fn pressure_mass(area: f64) -> [f64; 3] {
 /// Nodes of a cell without its centre, in local order.
 pub const SKELETON_NODES: [usize; 8] = [0, 1, 2, 3, 5, 6, 7, 8];
 
-/// A cell's matrix with the centre node condensed:
-/// `A_bb - A_bc A_cc^-1 A_cb`, and what brings the centre back.
-#[derive(Clone)]
-pub struct Condensed<const D: usize> {
-    /// Lower triangle by node pairs `(k, l)`, `k >= l`, of [`SKELETON_NODES`], each a full block.
-    pub blocks: [[[f64; D]; D]; 36],
+/// A cell's matrix on its skeleton nodes, the lower triangle by node pairs `(k, l)`, `k >= l`, of
+/// [`SKELETON_NODES`], each a full block; see [`pair`].
+pub type CellBlocks<const D: usize> = [[[f64; D]; D]; 36];
+
+/// What brings the centre node of a cell back that was condensed.
+#[derive(Clone, Copy)]
+pub struct Centre<const D: usize> {
     /// `A_cc^-1`
-    pub centre_inverse: [[f64; D]; D],
+    pub inverse: [[f64; D]; D],
     /// `A_cc^-1 A_cb`, by skeleton node.
     pub coupling: [[[f64; D]; D]; 8],
 }
 
-/// Index of the node pair `(k, l)`, `k >= l`, in [`Condensed::blocks`].
+/// Index of the node pair `(k, l)`, `k >= l`, in [`CellBlocks`].
 pub const fn pair(k: usize, l: usize) -> usize {
     k * (k + 1) / 2 + l
 }
 
-impl<const D: usize> Condensed<D> {
-    /// `a` must be symmetric; unknowns with a zero diagonal at the centre become idle.
-    pub fn new(a: &Matrix) -> Self {
-        let at = |i: usize, ci: usize, j: usize, cj: usize| a[NODES * ci + i][NODES * cj + j];
-        let mut centre = nalgebra::SMatrix::<f64, D, D>::from_fn(|r, c| at(CENTRE, r, CENTRE, c));
-        for c in 0..D {
-            if centre[(c, c)] == 0.0 {
-                centre[(c, c)] = 1.0;
-            }
+/// Condenses the centre node of a cell: `A_bb - A_bc A_cc^-1 A_cb`. `a` must be symmetric; unknowns
+/// with a zero diagonal at the centre become idle.
+pub fn condense<const D: usize>(a: &Matrix) -> (CellBlocks<D>, Centre<D>) {
+    let at = |i: usize, ci: usize, j: usize, cj: usize| a[NODES * ci + i][NODES * cj + j];
+    let mut centre = nalgebra::SMatrix::<f64, D, D>::from_fn(|r, c| at(CENTRE, r, CENTRE, c));
+    for c in 0..D {
+        if centre[(c, c)] == 0.0 {
+            centre[(c, c)] = 1.0;
         }
-        let inverse = invert(&centre);
-        let mut coupling = [[[0.0; D]; D]; 8];
-        for (l, &b) in SKELETON_NODES.iter().enumerate() {
-            for r in 0..D {
-                for c in 0..D {
-                    coupling[l][r][c] = (0..D).map(|m| inverse[(r, m)] * at(CENTRE, m, b, c)).sum();
-                }
-            }
-        }
-        let mut blocks = [[[0.0; D]; D]; 36];
-        for (k, &i) in SKELETON_NODES.iter().enumerate() {
-            for (l, &j) in SKELETON_NODES.iter().enumerate().take(k + 1) {
-                for r in 0..D {
-                    for c in 0..D {
-                        let condensed: f64 =
-                            (0..D).map(|m| at(i, r, CENTRE, m) * coupling[l][m][c]).sum();
-                        blocks[pair(k, l)][r][c] = at(i, r, j, c) - condensed;
-                    }
-                }
-            }
-        }
-        let mut centre_inverse = [[0.0; D]; D];
+    }
+    let inverse = invert(&centre);
+    let mut coupling = [[[0.0; D]; D]; 8];
+    for (l, &b) in SKELETON_NODES.iter().enumerate() {
         for r in 0..D {
             for c in 0..D {
-                centre_inverse[r][c] = inverse[(r, c)];
+                coupling[l][r][c] = (0..D).map(|m| inverse[(r, m)] * at(CENTRE, m, b, c)).sum();
             }
         }
-        Condensed { blocks, centre_inverse, coupling }
     }
+    let mut blocks = [[[0.0; D]; D]; 36];
+    for (k, &i) in SKELETON_NODES.iter().enumerate() {
+        for (l, &j) in SKELETON_NODES.iter().enumerate().take(k + 1) {
+            for r in 0..D {
+                for c in 0..D {
+                    let condensed: f64 =
+                        (0..D).map(|m| at(i, r, CENTRE, m) * coupling[l][m][c]).sum();
+                    blocks[pair(k, l)][r][c] = at(i, r, j, c) - condensed;
+                }
+            }
+        }
+    }
+    let inverse = std::array::from_fn(|r| std::array::from_fn(|c| inverse[(r, c)]));
+    (blocks, Centre { inverse, coupling })
 }
 
 /// Inverse of a small symmetric positive definite matrix (Cholesky by hand: `D` is 2 or 3).

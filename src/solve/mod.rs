@@ -2,11 +2,12 @@
 //! sparse factor, corrections.
 
 pub mod buoyancy;
-pub mod cholesky;
 pub mod element;
 pub mod interface;
 pub mod laminate;
+pub mod matrices;
 pub mod minority;
+pub mod multifrontal;
 pub mod quadrature;
 pub mod spin;
 pub mod stokes;

@@ -26,6 +26,10 @@ use crate::space::fit::{Degree, Fit};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_3, GAUSS_3X3, GAUSS_6X6, SUBPOINTS, Shape};
+use crate::threads::{self, Divisible};
+
+/// Cells that are worth a task of their own.
+const GRAIN: usize = 32;
 
 /// Width of the fraction kernel in cells: 0.4 was the best of those measured.
 const KERNEL_WIDTH: f64 = 0.4;
@@ -213,7 +217,7 @@ impl Quadrature {
         if self.rule == Rule::Particles {
             self.points.clear();
         }
-        let mut scratch = Scratch::new(materials.len());
+        let mut fresh = vec![false; mesh.cells()];
         for cell in 0..mesh.cells() {
             let content = if mesh.solid[cell] {
                 Content::Solid
@@ -228,16 +232,35 @@ impl Quadrature {
             let content = if moving { Content::Mixed } else { content };
             let unchanged = content != Content::Mixed && content == self.content[cell];
             self.content[cell] = content;
-            match self.rule {
-                Rule::Mixture | Rule::Laminate => {
-                    if !unchanged {
-                        self.mix(mesh, cell, particles, materials, &mut scratch);
-                    }
-                }
-                Rule::Particles => self.list(mesh, cell, particles, materials),
+            fresh[cell] = !unchanged;
+            if self.rule == Rule::Particles {
+                self.list(mesh, cell, particles, materials);
             }
         }
         if self.rule != Rule::Particles {
+            let from = Ingredients {
+                rule: self.rule,
+                mesh,
+                particles,
+                materials,
+                content: &self.content,
+                factors: &self.factors,
+            };
+            let cells = CellsMut {
+                materials: self.materials,
+                points: &mut self.points,
+                cut: &mut self.cut,
+                mean_viscosity: &mut self.mean_viscosity,
+                compliance: &mut self.compliance,
+                fractions: &mut self.fractions,
+            };
+            threads::for_parts(cells, 0..mesh.cells(), GRAIN, |range, mut cells| {
+                let mut scratch = None;
+                for (k, cell) in range.enumerate().filter(|&(_, c)| fresh[c]) {
+                    let scratch = scratch.get_or_insert_with(|| Scratch::new(materials.len()));
+                    cells.mix(k, cell, from, scratch);
+                }
+            });
             self.keep_volumes(mesh, particles);
         }
         Ok(())
@@ -278,69 +301,19 @@ impl Quadrature {
         }
     }
 
-    /// Fills the means of a cell of one uniform material; its law.
-    fn fill_uniform(&mut self, cell: usize, material: usize, materials: &[Material]) -> PointLaw {
-        let m = &materials[material];
-        self.mean_viscosity[cell] = m.viscosity;
-        self.compliance[cell] = m.compliance;
-        let fractions = &mut self.fractions[cell * self.materials..][..self.materials];
-        fractions.fill(0.0);
-        fractions[material] = 1.0;
-        m.law(m.viscosity, &Texture::default())
-    }
-
-    fn mix(
-        &mut self,
-        mesh: &Mesh,
-        cell: usize,
-        particles: &Particles,
-        materials: &[Material],
-        scratch: &mut Scratch,
-    ) {
-        self.cut[cell] = None;
-        match self.content[cell] {
-            Content::Uniform { material, .. } => {
-                let law = self.fill_uniform(cell, material as usize, materials);
-                for p in &mut self.points[9 * cell..9 * cell + 9] {
-                    p.law = law;
-                }
-            }
-            Content::Mixed => {
-                let points = &mut self.points[9 * cell..9 * cell + 9];
-                let fractions = &mut self.fractions[cell * self.materials..][..self.materials];
-                scratch.gather(mesh, cell, particles, materials);
-                let form = match self.rule {
-                    Rule::Laminate => scratch.form(mesh, cell, particles, materials),
-                    Rule::Mixture | Rule::Particles => Form::Mixture,
-                };
-                let mixture = match form {
-                    Form::Drops { around } => Mixture::around_drops(around),
-                    Form::Cut { .. } | Form::Mixture => Mixture::default(),
-                };
-                let (viscosity, compliance) =
-                    scratch.evaluate(points, fractions, materials, &self.factors, mixture);
-                self.mean_viscosity[cell] = viscosity;
-                self.compliance[cell] = compliance;
-                if let Form::Cut { interface, between } = form {
-                    let size = mesh.cell_size(cell);
-                    let cut = scratch.laminate(size, &interface, between, materials);
-                    // In parallel: the stiff part counts. With the mixture's mean as the
-                    // scale of the penalty layers of contrast 1e8 do not converge.
-                    let arithmetic = scratch.arithmetic_viscosity(materials);
-                    self.mean_viscosity[cell] =
-                        cut.rest * viscosity + (1.0 - cut.rest) * arithmetic;
-                    self.cut[cell] = Some(Box::new(cut));
-                }
-            }
-            Content::Solid | Content::Unknown => {}
-        }
-    }
-
     /// Particles as integration points.
     fn list(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
         let range = particles.of_cell(cell);
         if let Content::Uniform { material, .. } = self.content[cell] {
-            let law = self.fill_uniform(cell, material as usize, materials);
+            let cells = &mut CellsMut {
+                materials: self.materials,
+                points: &mut [],
+                cut: &mut [],
+                mean_viscosity: &mut self.mean_viscosity,
+                compliance: &mut self.compliance,
+                fractions: &mut self.fractions,
+            };
+            let law = cells.fill_uniform(cell, material as usize, materials);
             if range.is_empty() {
                 let density = materials[material as usize].density;
                 self.points.extend(GAUSS_3X3.iter().map(|g| IntegrationPoint {
@@ -406,6 +379,101 @@ impl Quadrature {
                     r: g.r,
                 }));
             }
+        }
+    }
+}
+
+/// What cells are evaluated from.
+#[derive(Clone, Copy)]
+struct Ingredients<'a> {
+    rule: Rule,
+    mesh: &'a Mesh,
+    particles: &'a Particles,
+    materials: &'a [Material],
+    content: &'a [Content],
+    factors: &'a [f64],
+}
+
+/// What some consecutive cells have, to be written.
+struct CellsMut<'a> {
+    materials: usize,
+    points: &'a mut [IntegrationPoint],
+    cut: &'a mut [Option<Box<CutStiffness>>],
+    mean_viscosity: &'a mut [f64],
+    compliance: &'a mut [f64],
+    fractions: &'a mut [f64],
+}
+
+impl Divisible for CellsMut<'_> {
+    fn cut(self, at: usize) -> (Self, Self) {
+        let materials = self.materials;
+        let (p0, p1) = self.points.split_at_mut(9 * at);
+        let (k0, k1) = self.cut.split_at_mut(at);
+        let (v0, v1) = self.mean_viscosity.split_at_mut(at);
+        let (c0, c1) = self.compliance.split_at_mut(at);
+        let (f0, f1) = self.fractions.split_at_mut(materials * at);
+        let part = |points, cut, mean_viscosity, compliance, fractions| CellsMut {
+            materials,
+            points,
+            cut,
+            mean_viscosity,
+            compliance,
+            fractions,
+        };
+        (part(p0, k0, v0, c0, f0), part(p1, k1, v1, c1, f1))
+    }
+}
+
+impl CellsMut<'_> {
+    /// Fills the means of a cell of one uniform material; its law.
+    fn fill_uniform(&mut self, k: usize, material: usize, materials: &[Material]) -> PointLaw {
+        let m = &materials[material];
+        self.mean_viscosity[k] = m.viscosity;
+        self.compliance[k] = m.compliance;
+        let fractions = &mut self.fractions[k * self.materials..][..self.materials];
+        fractions.fill(0.0);
+        fractions[material] = 1.0;
+        m.law(m.viscosity, &Texture::default())
+    }
+
+    /// Evaluates cell `cell`, the `k`th of these.
+    fn mix(&mut self, k: usize, cell: usize, from: Ingredients, scratch: &mut Scratch) {
+        let Ingredients { rule, mesh, particles, materials, content, factors } = from;
+        self.cut[k] = None;
+        match content[cell] {
+            Content::Uniform { material, .. } => {
+                let law = self.fill_uniform(k, material as usize, materials);
+                for p in &mut self.points[9 * k..9 * k + 9] {
+                    p.law = law;
+                }
+            }
+            Content::Mixed => {
+                let points = &mut self.points[9 * k..9 * k + 9];
+                let fractions = &mut self.fractions[k * self.materials..][..self.materials];
+                scratch.gather(mesh, cell, particles, materials);
+                let form = match rule {
+                    Rule::Laminate => scratch.form(mesh, cell, particles, materials),
+                    Rule::Mixture | Rule::Particles => Form::Mixture,
+                };
+                let mixture = match form {
+                    Form::Drops { around } => Mixture::around_drops(around),
+                    Form::Cut { .. } | Form::Mixture => Mixture::default(),
+                };
+                let (viscosity, compliance) =
+                    scratch.evaluate(points, fractions, materials, factors, mixture);
+                self.mean_viscosity[k] = viscosity;
+                self.compliance[k] = compliance;
+                if let Form::Cut { interface, between } = form {
+                    let size = mesh.cell_size(cell);
+                    let cut = scratch.laminate(size, &interface, between, materials);
+                    // In parallel: the stiff part counts. With the mixture's mean as the
+                    // scale of the penalty layers of contrast 1e8 do not converge.
+                    let arithmetic = scratch.arithmetic_viscosity(materials);
+                    self.mean_viscosity[k] = cut.rest * viscosity + (1.0 - cut.rest) * arithmetic;
+                    self.cut[k] = Some(Box::new(cut));
+                }
+            }
+            Content::Solid | Content::Unknown => {}
         }
     }
 }

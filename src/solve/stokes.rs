@@ -26,23 +26,23 @@
 //! the latter, and a few more corrections bring it down to rounding.
 
 use super::buoyancy::{Restoring, SIDE_NODES};
-use super::cholesky::{FactorError, SparseCholesky};
-use super::element::{
-    Condensed, Divergence, Internal, LOCAL, Matrix, Nodal, PointShape, SKELETON_NODES,
-    add_cut_stiffness, add_stiffness, mirror, pair, pressure_mass,
-};
-use super::quadrature::{Content, Quadrature};
-use super::spin::SpinModes;
+use super::element::{Divergence, Internal, Nodal, SKELETON_NODES, pressure_mass};
+use super::matrices::{Ingredients, Matrices};
+use super::multifrontal::tree::{NO_POSITION, Tree};
+use super::multifrontal::{Multifrontal, NotPositiveDefinite};
+use super::quadrature::Quadrature;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
+use crate::space::incidence::Incidence;
 use crate::space::mesh::Mesh;
-use crate::space::numbering::Skeleton;
 use crate::space::shape::{CENTRE, NODES};
+use crate::threads;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Penalty `r` in units of the cell's viscosity.
-const PENALTY: f64 = 1e4;
+/// Cells, and nodes, that are worth a task of their own.
+const CELL_GRAIN: usize = 128;
+const NODE_GRAIN: usize = 2048;
 
 /// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
 const RIGID_SHARE: f64 = 1e-3;
@@ -118,7 +118,7 @@ pub struct Seconds {
 #[derive(Debug, thiserror::Error)]
 pub enum SolveError {
     #[error("{source}, at ({x:.4e}, {y:.4e}), unknown {component}")]
-    Factor { source: FactorError, x: f64, y: f64, component: &'static str },
+    Factor { source: NotPositiveDefinite, x: f64, y: f64, component: &'static str },
     #[error(
         "no convergence in {corrections} corrections: residual {residual:.1e}, \
          divergence {divergence:.1e}; the worst is at ({x:.4e}, {y:.4e})"
@@ -142,29 +142,16 @@ impl SolveError {
     }
 }
 
-/// The discrete problem on one mesh: pattern, boundary conditions, element matrices.
+/// The discrete problem on one mesh: boundary conditions, element matrices, factor.
 pub struct Stokes<const D: usize> {
     mesh: Arc<Mesh>,
-    /// Of every cell: each correction asks five times, and finding them takes divisions.
-    nodes: Vec<[usize; NODES]>,
-    skeleton: Skeleton,
+    incidence: Incidence,
     constraints: Constraints<D>,
-    matrix: SparseCholesky,
-    /// Position below the diagonal of every node pair of a cell.
-    scatter: Vec<[u32; 36]>,
-    cells: Vec<CellMatrix<D>>,
+    matrices: Matrices<D>,
+    factor: Multifrontal<D>,
     /// Unaugmented diagonal, per node.
     diagonal: Vec<[f64; D]>,
     work: Work<D>,
-}
-
-#[derive(Clone)]
-struct CellMatrix<const D: usize> {
-    built_from: Content,
-    condensed: Condensed<D>,
-    diagonal: Nodal<D>,
-    /// W
-    penalty: [f64; 3],
 }
 
 /// What drives a solution.
@@ -186,12 +173,31 @@ struct Given<'a, const D: usize> {
 #[derive(Default)]
 struct Work<const D: usize> {
     residual: Residual<D>,
+    /// What each cell has for its nodes.
+    shares: Vec<Share<D>>,
     /// Right-hand side and solution on the skeleton.
     skeleton: Vec<f64>,
     correction: Correction<D>,
     /// Corrections of this solution, of orthonormal divergence; the first `kept` are valid.
     directions: Vec<Correction<D>>,
     kept: usize,
+}
+
+/// What a cell adds to the forces on its nodes, and to sums over all cells.
+#[derive(Clone, Copy)]
+struct Share<const D: usize> {
+    force: Nodal<D>,
+    divergence: [f64; 3],
+    sums: [f64; SUMS],
+}
+
+/// Sums over cells in a [`Residual`].
+const SUMS: usize = 7;
+
+impl<const D: usize> Default for Share<D> {
+    fn default() -> Self {
+        Share { force: [[0.0; D]; NODES], divergence: [0.0; 3], sums: [0.0; SUMS] }
+    }
 }
 
 /// A change of velocity (and rotation) and pressure.
@@ -246,49 +252,17 @@ struct Residual<const D: usize> {
 }
 
 impl<const D: usize> Stokes<D> {
-    pub fn new(mesh: Arc<Mesh>, constraints: Constraints<D>) -> Result<Self, FactorError> {
-        let skeleton = Skeleton::new(&mesh);
-        let matrix = SparseCholesky::new(&skeleton, D)?;
-        let scatter = (0..mesh.cells())
-            .map(|cell| {
-                let nodes = mesh.cell_nodes(cell);
-                let position = SKELETON_NODES.map(|a| skeleton.position[nodes[a]]);
-                let mut ranks = [0; 36];
-                for k in 0..8 {
-                    for l in 0..k {
-                        let (col, row) =
-                            (position[k].min(position[l]), position[k].max(position[l]));
-                        let range = skeleton.col_ptr[col as usize] as usize
-                            ..skeleton.col_ptr[col as usize + 1] as usize;
-                        // Solid cells are not in the pattern; they are never scattered.
-                        ranks[pair(k, l)] =
-                            skeleton.rows[range].binary_search(&row).unwrap_or(0) as u32;
-                    }
-                }
-                ranks
-            })
-            .collect();
-        let empty = CellMatrix {
-            built_from: Content::Unknown,
-            condensed: Condensed {
-                blocks: [[[0.0; D]; D]; 36],
-                centre_inverse: [[0.0; D]; D],
-                coupling: [[[0.0; D]; D]; 8],
-            },
-            diagonal: [[0.0; D]; NODES],
-            penalty: [0.0; 3],
-        };
-        Ok(Stokes {
-            cells: vec![empty; mesh.cells()],
+    pub fn new(mesh: Arc<Mesh>, constraints: Constraints<D>) -> Self {
+        let tree = Arc::new(Tree::new(&mesh));
+        Stokes {
+            incidence: Incidence::new(&mesh),
+            matrices: Matrices::new(mesh.cells()),
+            factor: Multifrontal::new(tree, mesh.cells()),
             diagonal: vec![[0.0; D]; mesh.nodes()],
-            nodes: (0..mesh.cells()).map(|cell| mesh.cell_nodes(cell)).collect(),
             work: Work::default(),
             mesh,
-            skeleton,
             constraints,
-            matrix,
-            scatter,
-        })
+        }
     }
 
     pub fn mesh(&self) -> &Arc<Mesh> {
@@ -314,7 +288,7 @@ impl<const D: usize> Stokes<D> {
         report.active_rotation = self.assemble(quadrature, loads.restoring);
         report.seconds.assemble = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        self.matrix.factorize().map_err(|e| self.explain(e))?;
+        self.factor.factorize(&self.matrices.blocks).map_err(|e| self.explain(e))?;
         report.seconds.factor = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         self.constraints.impose(&mut flow.velocity);
@@ -341,7 +315,7 @@ impl<const D: usize> Stokes<D> {
         let load = loads.nodal;
         let mut further = 0;
         loop {
-            self.residual(quadrature, loads, flow, &mut work.residual);
+            self.residual(quadrature, loads, flow, work);
             let residual = &work.residual;
             let slack;
             (report.residual, report.divergence, slack, report.power_scale) =
@@ -363,170 +337,22 @@ impl<const D: usize> Stokes<D> {
             } else if report.corrections >= stopping.max_corrections {
                 return Err(self.stalled(residual, report, stopping.tolerance));
             }
-            self.correct(work).map_err(|e| self.explain(e))?;
+            self.correct(quadrature, work);
             // Sums of corrections mind the divergence only; here the forces are to be corrected.
-            self.combine(quadrature, work, balanced && !converged);
+            self.combine(work, balanced && !converged);
             self.apply(work, flow);
             report.corrections += 1;
         }
     }
 
-    /// Element matrices of the cells that changed, and the skeleton matrix; number of active
-    /// rotation unknowns.
+    /// Element matrices of the cells that changed; number of active rotation unknowns.
     fn assemble(&mut self, quadrature: &Quadrature, restoring: &Restoring) -> usize {
-        self.matrix.values_mut().fill(0.0);
-        self.diagonal.iter_mut().for_each(|d| *d = [0.0; D]);
-        for cell in 0..self.mesh.cells() {
-            let content = quadrature.content(cell);
-            if content == Content::Solid {
-                continue;
-            }
-            if content == Content::Mixed || content != self.cells[cell].built_from {
-                self.build(cell, quadrature, restoring);
-                self.cells[cell].built_from = content;
-            }
-            self.scatter(cell);
-        }
-        self.add_restoring(restoring);
-        self.matrix.fill_empty_diagonal();
-        if D == 3 { self.diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
-    }
-
-    fn build(&mut self, cell: usize, quadrature: &Quadrature, restoring: &Restoring) {
-        let size = self.mesh.cell_size(cell);
-        let area = size[0] * size[1];
-        let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
-        let cut = quadrature.cut(cell);
-        // What a stiff rotation adds to the viscosity of a flow on the scale of the cell.
-        let (mut turning, thickness) = (0.0, size[0].min(size[1]));
-        quadrature.for_points(cell, |p, shape| {
-            let law = p.law.without_excess();
-            let law = cut.map_or(law, |cut| law.with_viscosity_scaled(cut.rest));
-            add_stiffness::<D>(&mut k, &PointShape::new(shape, size), &law, p.weight * area);
-            turning += p.weight * p.law.turning_viscosity(thickness);
-        });
-        if let Some(cut) = cut {
-            add_cut_stiffness(&mut k, cut);
-        }
-        if D == 3
-            && let Some(modes) = SpinModes::new(quadrature, cell, size)
-        {
-            modes.add_stiffness(&mut k);
-        }
-        if restoring.cell_strength(cell) > 0.0 {
-            for i in 0..2 * NODES {
-                for j in 0..NODES * (i / NODES + 1) {
-                    let (nodes, components) = ([i % NODES, j % NODES], [i / NODES, j / NODES]);
-                    k[i][j] += restoring.cell_entry(cell, nodes, components);
-                }
-            }
-        }
-        let mass = pressure_mass(area);
-        let viscosity = quadrature.mean_viscosity[cell] + if D == 3 { turning } else { 0.0 };
-        let give = 1.0 / (PENALTY * viscosity) + quadrature.compliance[cell];
-        let out = &mut self.cells[cell];
-        out.penalty = mass.map(|m| 1.0 / (m * give));
-        for a in 0..NODES {
-            for c in 0..D {
-                out.diagonal[a][c] = k[NODES * c + a][NODES * c + a];
-            }
-        }
-        Divergence::new(size).add_penalty(&out.penalty, &mut k);
-        mirror::<D>(&mut k);
-        for (a, node) in self.nodes[cell].into_iter().enumerate() {
-            for c in 0..D {
-                if self.constraints.is_fixed(node, c) {
-                    let i = NODES * c + a;
-                    k[i].fill(0.0);
-                    k.iter_mut().for_each(|row| row[i] = 0.0);
-                }
-            }
-        }
-        out.condensed = Condensed::new(&k);
-    }
-
-    fn scatter(&mut self, cell: usize) {
-        let nodes = self.nodes[cell];
-        let position = SKELETON_NODES.map(|a| self.skeleton.position[nodes[a]] as usize);
-        let built = &self.cells[cell];
-        for (a, node) in nodes.into_iter().enumerate() {
-            for c in 0..D {
-                self.diagonal[node][c] += built.diagonal[a][c];
-            }
-        }
-        for k in 0..8 {
-            for l in 0..=k {
-                let block = &built.condensed.blocks[pair(k, l)];
-                if k == l {
-                    for c in 0..D {
-                        for r in c..D {
-                            let at = self.matrix.diagonal_entry(position[k], r, c);
-                            self.matrix.values_mut()[at] += block[r][c];
-                        }
-                    }
-                    continue;
-                }
-                let rank = self.scatter[cell][pair(k, l)] as usize;
-                let (column, transposed) = if position[k] > position[l] {
-                    (position[l], false)
-                } else {
-                    (position[k], true)
-                };
-                for c in 0..D {
-                    let start = self.matrix.block_start(column, rank, c);
-                    let values = &mut self.matrix.values_mut()[start..start + D];
-                    for r in 0..D {
-                        values[r] += if transposed { block[c][r] } else { block[r][c] };
-                    }
-                }
-            }
-        }
-    }
-
-    /// Adds the terms of faces, whose nodes the skeleton has all.
-    fn add_restoring(&mut self, restoring: &Restoring) {
-        for face in &restoring.faces {
-            let nodes = self.nodes[face.cell];
-            let side = SIDE_NODES[face.normal];
-            for (k, &a) in side.iter().enumerate() {
-                for c in 0..2 {
-                    self.diagonal[nodes[a]][c] += restoring.entry(face, [k, k], [c, c]);
-                }
-                for (l, &b) in side.iter().enumerate().take(k + 1) {
-                    self.add_block(face.cell, [a, b], |r, c| restoring.entry(face, [k, l], [r, c]));
-                }
-            }
-        }
-    }
-
-    /// Adds velocity entries to the matrix for nodes `a >= b` on the rim of a cell.
-    fn add_block(&mut self, cell: usize, [a, b]: [usize; 2], entry: impl Fn(usize, usize) -> f64) {
-        let nodes = [a, b].map(|n| self.nodes[cell][n]);
-        let position = nodes.map(|n| self.skeleton.position[n] as usize);
-        // Local nodes without the centre.
-        let [k, l] = [a, b].map(|n| n - usize::from(n > CENTRE));
-        for r in 0..2 {
-            for c in 0..2 {
-                if self.constraints.is_fixed(nodes[0], r) || self.constraints.is_fixed(nodes[1], c)
-                {
-                    continue;
-                }
-                let at = if k == l {
-                    if r < c {
-                        continue;
-                    }
-                    self.matrix.diagonal_entry(position[0], r, c)
-                } else {
-                    let rank = self.scatter[cell][pair(k, l)] as usize;
-                    if position[0] > position[1] {
-                        self.matrix.block_start(position[1], rank, c) + r
-                    } else {
-                        self.matrix.block_start(position[0], rank, r) + c
-                    }
-                };
-                self.matrix.values_mut()[at] += entry(r, c);
-            }
-        }
+        let Stokes { mesh, incidence, constraints, matrices, factor, diagonal, .. } = self;
+        let from = Ingredients { mesh, incidence, constraints, quadrature, restoring };
+        matrices.update(from, |cell| factor.touch(cell));
+        diagonal.fill([0.0; D]);
+        incidence.add_up(diagonal, |cell, a| matrices.cells[cell].diagonal[a]);
+        if D == 3 { diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
     }
 
     fn residual(
@@ -534,16 +360,27 @@ impl<const D: usize> Stokes<D> {
         quadrature: &Quadrature,
         Loads { nodal, restoring }: Loads<D>,
         flow: &Flow<D>,
-        out: &mut Residual<D>,
+        work: &mut Work<D>,
     ) {
+        let Work { residual: out, shares, .. } = work;
+        shares.resize(self.mesh.cells(), Share::default());
+        threads::for_each(shares, CELL_GRAIN, |cell, share| {
+            if !self.mesh.solid[cell] {
+                self.cell_residual(cell, quadrature, restoring, flow, share);
+            }
+        });
+        let sums = threads::sum(0..shares.len(), |cell| shares[cell].sums);
+        [out.dissipation, out.strain, out.divergence_norm, out.restoring, ..] = sums;
+        [.., out.pressure_norm, out.yielding, out.pressure_square] = sums;
+        let cells = (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]);
+        out.stiffest = cells.map(|c| quadrature.mean_viscosity[c]).fold(0.0, f64::max);
+        out.divergence.clear();
+        out.divergence.extend(shares.iter().map(|s| s.divergence));
         out.force.clear();
         out.force.extend_from_slice(nodal);
-        out.divergence.resize(self.mesh.cells(), [0.0; 3]);
-        (out.dissipation, out.strain, out.divergence_norm) = (0.0, 0.0, 0.0);
-        (out.restoring, out.pressure_norm, out.yielding) = (0.0, 0.0, 0.0);
-        (out.pressure_square, out.stiffest) = (0.0, 0.0);
+        self.incidence.add_up(&mut out.force, |cell, a| shares[cell].force[a]);
         for face in &restoring.faces {
-            let nodes = SIDE_NODES[face.normal].map(|a| self.nodes[face.cell][a]);
+            let nodes = SIDE_NODES[face.normal].map(|a| self.incidence.nodes[face.cell][a]);
             let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
             let (force, power) = restoring.force(face, nodes, u);
             out.restoring += power;
@@ -552,69 +389,81 @@ impl<const D: usize> Stokes<D> {
                 out.force[node][1] += f[1];
             }
         }
-        for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
-            let size = self.mesh.cell_size(cell);
-            let area = size[0] * size[1];
-            let u = self.nodes[cell].map(|n| flow.velocity[n]);
-            let internal = Internal::new(quadrature, cell, size, &u);
-            out.dissipation += internal.dissipation;
-            out.strain += internal.strain;
-            let divergence = Divergence::new(size);
-            let mass = pressure_mass(area);
-            let pressure = flow.pressure[cell];
-            let compliance = quadrature.compliance[cell];
-            out.stiffest = out.stiffest.max(quadrature.mean_viscosity[cell]);
-            let mut g = [[0.0; D]; NODES];
-            divergence.add_transposed(&pressure, &mut g);
-            for (a, node) in self.nodes[cell].into_iter().enumerate() {
-                for c in 0..2 {
-                    out.pressure_norm += g[a][c] * g[a][c] / self.diagonal[node][c];
-                }
-            }
-            let bu = divergence.apply(&u);
-            for q in 0..3 {
-                let rp = bu[q] + compliance * mass[q] * pressure[q];
-                let needed = pressure[q] / self.cells[cell].penalty[q];
-                out.yielding += needed * needed / mass[q];
-                out.pressure_square += mass[q] * pressure[q] * pressure[q];
-                out.divergence[cell][q] = rp;
-                out.divergence_norm += rp * rp / mass[q];
-                out.dissipation += compliance * mass[q] * pressure[q] * pressure[q];
-            }
-            for (a, node) in self.nodes[cell].into_iter().enumerate() {
-                for c in 0..D {
-                    out.force[node][c] += g[a][c] - internal.force[a][c];
-                }
-            }
-            if restoring.cell_strength(cell) > 0.0 {
-                let along = u.map(|u| [u[0], u[1]]);
-                let (force, power) = restoring.cell_force(cell, &self.nodes[cell], along);
-                out.restoring += power;
-                for (node, f) in self.nodes[cell].into_iter().zip(force) {
-                    out.force[node][0] += f[0];
-                    out.force[node][1] += f[1];
-                }
+    }
+
+    fn cell_residual(
+        &self,
+        cell: usize,
+        quadrature: &Quadrature,
+        restoring: &Restoring,
+        flow: &Flow<D>,
+        share: &mut Share<D>,
+    ) {
+        let nodes = &self.incidence.nodes[cell];
+        let size = self.mesh.cell_size(cell);
+        let u = nodes.map(|n| flow.velocity[n]);
+        let internal = Internal::new(quadrature, cell, size, &u);
+        let divergence = Divergence::new(size);
+        let mass = pressure_mass(size[0] * size[1]);
+        let pressure = flow.pressure[cell];
+        let compliance = quadrature.compliance[cell];
+        let mut force = [[0.0; D]; NODES];
+        divergence.add_transposed(&pressure, &mut force);
+        let mut pressure_norm = 0.0;
+        for (a, &node) in nodes.iter().enumerate() {
+            for c in 0..2 {
+                pressure_norm += force[a][c] * force[a][c] / self.diagonal[node][c];
             }
         }
+        let bu = divergence.apply(&u);
+        let [mut yielding, mut pressure_square, mut divergence_norm] = [0.0; 3];
+        for q in 0..3 {
+            let rp = bu[q] + compliance * mass[q] * pressure[q];
+            let needed = pressure[q] / self.matrices.cells[cell].penalty[q];
+            yielding += needed * needed / mass[q];
+            pressure_square += mass[q] * pressure[q] * pressure[q];
+            divergence_norm += rp * rp / mass[q];
+            share.divergence[q] = rp;
+        }
+        let dissipation = internal.dissipation + compliance * pressure_square;
+        for a in 0..NODES {
+            for c in 0..D {
+                force[a][c] -= internal.force[a][c];
+            }
+        }
+        let mut taken = 0.0;
+        if restoring.cell_strength(cell) > 0.0 {
+            let along = u.map(|u| [u[0], u[1]]);
+            let (f, power) = restoring.cell_force(cell, nodes, along);
+            taken = power;
+            for (force, f) in force.iter_mut().zip(f) {
+                force[0] += f[0];
+                force[1] += f[1];
+            }
+        }
+        share.force = force;
+        let [strain, norms] = [internal.strain, divergence_norm];
+        share.sums = [dissipation, strain, norms, taken, pressure_norm, yielding, pressure_square];
     }
 
     /// Scaled residual, relative divergence, what the penalty makes of the pressure relative to the
     /// same scale, and a scale of power.
     fn norms(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> (f64, f64, f64, f64) {
-        let (mut rr, mut ff, mut uu) = (0.0, 0.0, 0.0);
-        for node in 0..self.mesh.nodes() {
+        let [rr, ff, uu] = threads::sum(0..self.mesh.nodes(), |node| {
+            let mut sums = [0.0; 3];
             for c in 0..D {
                 let d = self.diagonal[node][c];
                 if d == 0.0 {
                     continue;
                 }
-                uu += d * flow.velocity[node][c].powi(2);
+                sums[2] += d * flow.velocity[node][c].powi(2);
                 if !self.constraints.is_fixed(node, c) {
-                    rr += r.force[node][c].powi(2) / d;
-                    ff += load[node][c].powi(2) / d;
+                    sums[0] += r.force[node][c].powi(2) / d;
+                    sums[1] += load[node][c].powi(2) / d;
                 }
             }
-        }
+            sums
+        });
         // The last two terms keep the ratio sensible when nothing moves, and in a rigid rotation,
         // where divergence and strain are both rounding.
         let scale = ff.sqrt() + uu.sqrt() + PRESSURE_SHARE * r.pressure_norm.sqrt();
@@ -631,98 +480,108 @@ impl<const D: usize> Stokes<D> {
 
     /// Power of the loads and of the reactions on moving boundaries.
     fn power_in(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> f64 {
-        let mut power = 0.0;
-        for (node, u) in flow.velocity.iter().enumerate() {
+        let [power] = threads::sum(0..self.mesh.nodes(), |node| {
+            let (u, mut power) = (flow.velocity[node], 0.0);
             for c in 0..D {
                 power += load[node][c] * u[c];
                 if self.constraints.is_fixed(node, c) {
                     power -= r.force[node][c] * u[c];
                 }
             }
-        }
+            [power]
+        });
         power
     }
 
-    /// One correction; uses the residual's forces up.
-    fn correct(&mut self, work: &mut Work<D>) -> Result<(), FactorError> {
-        let Work { residual: r, skeleton: x, correction, .. } = work;
-        let du = &mut correction.velocity;
-        correction.pressure.resize(self.mesh.cells(), [0.0; 3]);
-        let force = &mut r.force;
-        for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
-            let divergence = Divergence::new(self.mesh.cell_size(cell));
-            let penalty = self.cells[cell].penalty;
-            let p: [f64; 3] = std::array::from_fn(|q| -penalty[q] * r.divergence[cell][q]);
-            let mut f = [[0.0; D]; NODES];
-            divergence.add_transposed(&p, &mut f);
-            for (a, node) in self.nodes[cell].into_iter().enumerate() {
+    /// One correction.
+    fn correct(&mut self, quadrature: &Quadrature, work: &mut Work<D>) {
+        let Work { residual, shares, skeleton, correction, .. } = work;
+        let Stokes { mesh, incidence, constraints, matrices, factor, .. } = self;
+        let free = |node: usize, mut force: [f64; D]| -> [f64; D] {
+            (0..D).filter(|&c| constraints.is_fixed(node, c)).for_each(|c| force[c] = 0.0);
+            force
+        };
+        // Right-hand side of each cell, its centre condensed; there the whole force.
+        threads::for_each(shares, CELL_GRAIN, |cell, share| {
+            if mesh.solid[cell] {
+                return;
+            }
+            let matrix = &matrices.cells[cell];
+            let p: [f64; 3] =
+                std::array::from_fn(|q| -matrix.penalty[q] * residual.divergence[cell][q]);
+            let mut force = [[0.0; D]; NODES];
+            Divergence::new(mesh.cell_size(cell)).add_transposed(&p, &mut force);
+            let node = incidence.nodes[cell][CENTRE];
+            let whole = std::array::from_fn(|c| force[CENTRE][c] + residual.force[node][c]);
+            force[CENTRE] = free(node, whole);
+            for (&a, coupling) in SKELETON_NODES.iter().zip(&matrix.centre.coupling) {
                 for c in 0..D {
-                    force[node][c] += f[a][c];
+                    let moved = (0..D).map(|m| coupling[m][c] * force[CENTRE][m]);
+                    force[a][c] -= moved.sum::<f64>();
                 }
             }
-        }
-        self.constraints.clear_fixed(force);
-        // Condense the centres.
-        for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
-            let nodes = self.nodes[cell];
-            let centre = force[nodes[CENTRE]];
-            for (l, &a) in SKELETON_NODES.iter().enumerate() {
-                let coupling = &self.cells[cell].condensed.coupling[l];
-                for c in 0..D {
-                    force[nodes[a]][c] -= (0..D).map(|m| coupling[m][c] * centre[m]).sum::<f64>();
+            share.force = force;
+        });
+        let tree = factor.tree().clone();
+        skeleton.resize(tree.len() * D, 0.0);
+        let (x, _) = skeleton.as_chunks_mut::<D>();
+        threads::for_each(x, NODE_GRAIN, |position, x| {
+            let node = tree.node[position] as usize;
+            *x = residual.force[node];
+            for (cell, a) in incidence.of_node(node) {
+                (0..D).for_each(|c| x[c] += shares[cell].force[a][c]);
+            }
+            *x = free(node, *x);
+        });
+        factor.solve(skeleton);
+        let (x, _) = skeleton.as_chunks::<D>();
+        correction.velocity.resize(mesh.nodes(), [0.0; D]);
+        threads::for_each(&mut correction.velocity, NODE_GRAIN, |node, du| {
+            let position = tree.position[node];
+            *du = if position == NO_POSITION { [0.0; D] } else { free(node, x[position as usize]) };
+        });
+        // The centre comes back, and the pressure.
+        let velocity = &correction.velocity;
+        threads::for_each(shares, CELL_GRAIN, |cell, share| {
+            if mesh.solid[cell] {
+                return;
+            }
+            let matrix = &matrices.cells[cell];
+            let mut du = incidence.nodes[cell].map(|n| velocity[n]);
+            let (inverse, force) = (&matrix.centre.inverse, &share.force[CENTRE]);
+            du[CENTRE] =
+                std::array::from_fn(|r| (0..D).map(|m| inverse[r][m] * force[m]).sum::<f64>());
+            for (&a, coupling) in SKELETON_NODES.iter().zip(&matrix.centre.coupling) {
+                for r in 0..D {
+                    du[CENTRE][r] -= (0..D).map(|m| coupling[r][m] * du[a][m]).sum::<f64>();
                 }
             }
-        }
-        x.resize(self.matrix.unknowns(), 0.0);
-        for (position, &node) in self.skeleton.node.iter().enumerate() {
-            x[D * position..D * position + D].copy_from_slice(&force[node as usize]);
-        }
-        self.matrix.solve(x)?;
-        du.resize(self.mesh.nodes(), [0.0; D]);
-        for (position, &node) in self.skeleton.node.iter().enumerate() {
-            du[node as usize].copy_from_slice(&x[D * position..D * position + D]);
-        }
-        self.constraints.clear_fixed(du);
-        for cell in (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]) {
-            let nodes = self.nodes[cell];
-            let built = &self.cells[cell];
-            let centre = force[nodes[CENTRE]];
-            let mut u: [f64; D] = std::array::from_fn(|r| {
-                (0..D).map(|m| built.condensed.centre_inverse[r][m] * centre[m]).sum()
-            });
-            for (l, &a) in SKELETON_NODES.iter().enumerate() {
-                let coupling = &built.condensed.coupling[l];
-                for (r, u) in u.iter_mut().enumerate() {
-                    *u -= (0..D).map(|m| coupling[r][m] * du[nodes[a]][m]).sum::<f64>();
-                }
-            }
-            du[nodes[CENTRE]] = u;
-            let bdu = Divergence::new(self.mesh.cell_size(cell)).apply(&nodes.map(|n| du[n]));
+            share.force[CENTRE] = du[CENTRE];
+            let size = mesh.cell_size(cell);
+            let (bdu, mass) = (Divergence::new(size).apply(&du), pressure_mass(size[0] * size[1]));
             for q in 0..3 {
-                correction.pressure[cell][q] = -built.penalty[q] * (r.divergence[cell][q] + bdu[q]);
+                let dp = -matrix.penalty[q] * (residual.divergence[cell][q] + bdu[q]);
+                share.sums[q] = dp;
+                share.divergence[q] = bdu[q] + quadrature.compliance[cell] * mass[q] * dp;
             }
+        });
+        correction.pressure.resize(mesh.cells(), [0.0; 3]);
+        correction.divergence.resize(mesh.cells(), [0.0; 3]);
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let share = &shares[cell];
+            correction.velocity[incidence.nodes[cell][CENTRE]] = share.force[CENTRE];
+            correction.pressure[cell] = [share.sums[0], share.sums[1], share.sums[2]];
+            correction.divergence[cell] = share.divergence;
         }
-        Ok(())
     }
 
     /// Combines a correction with those before it: of all sums of them the one that leaves the
     /// least divergence.
-    fn combine(&self, quadrature: &Quadrature, work: &mut Work<D>, balanced: bool) {
+    fn combine(&self, work: &mut Work<D>, balanced: bool) {
         if !balanced {
             return;
         }
-        let mesh = &self.mesh;
         let Work { residual, correction, directions, kept, .. } = work;
-        correction.divergence.resize(mesh.cells(), [0.0; 3]);
-        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            let du = self.nodes[cell].map(|n| correction.velocity[n]);
-            let bdu = Divergence::new(mesh.cell_size(cell)).apply(&du);
-            let mass = pressure_mass(mesh.cell_area(cell));
-            for q in 0..3 {
-                let give = quadrature.compliance[cell] * mass[q] * correction.pressure[cell][q];
-                correction.divergence[cell][q] = bdu[q] + give;
-            }
-        }
         for known in &directions[..*kept] {
             let along = self.product(&known.divergence, &correction.divergence);
             correction.add_scaled(-along, known);
@@ -746,11 +605,14 @@ impl<const D: usize> Stokes<D> {
 
     /// Inner product of two divergences.
     fn product(&self, a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-        let cell = |c: usize| -> f64 {
+        let [sum] = threads::sum(0..self.mesh.cells(), |c| {
+            if self.mesh.solid[c] {
+                return [0.0];
+            }
             let mass = pressure_mass(self.mesh.cell_area(c));
-            (0..3).map(|q| a[c][q] * b[c][q] / mass[q]).sum()
-        };
-        (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]).map(cell).sum()
+            [(0..3).map(|q| a[c][q] * b[c][q] / mass[q]).sum()]
+        });
+        sum
     }
 
     fn apply(&self, work: &Work<D>, flow: &mut Flow<D>) {
@@ -767,15 +629,11 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    fn explain(&self, e: FactorError) -> SolveError {
-        let (node, component) = match e {
-            FactorError::NotPositiveDefinite { unknown } => {
-                (self.skeleton.node[unknown / D] as usize, unknown % D)
-            }
-            FactorError::Symbolic(_) => (0, 0),
-        };
+    fn explain(&self, source: NotPositiveDefinite) -> SolveError {
+        let node = self.factor.tree().node[source.unknown / D] as usize;
         let [x, y] = self.mesh.node_position(node);
-        SolveError::Factor { source: e, x, y, component: ["u", "v", "w"][component] }
+        let component = ["u", "v", "w"][source.unknown % D];
+        SolveError::Factor { source, x, y, component }
     }
 
     fn stalled(&self, r: &Residual<D>, report: &Report, tolerance: f64) -> SolveError {

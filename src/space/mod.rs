@@ -3,9 +3,9 @@
 pub mod constraints;
 pub mod fit;
 pub mod flow;
+pub mod incidence;
 pub mod mesh;
 pub mod neighbours;
-pub mod numbering;
 pub mod particles;
 pub mod population;
 pub mod seeding;

@@ -1,6 +1,7 @@
 //! Particles: structure of arrays, kept sorted by cell. Columns that no effect needs are absent.
 
 use super::mesh::Mesh;
+use crate::threads;
 
 /// A column that exists only when an effect calls for it.
 pub type Column<T> = Option<Vec<T>>;
@@ -23,7 +24,50 @@ pub struct Particles {
     pub mark: Column<bool>,
     /// First particle of each cell, one more at the end; valid after [`Particles::sort`].
     pub cell_start: Vec<u32>,
+    sorting: Sorting,
 }
+
+/// Particles that are worth a task of their own.
+const GRAIN: usize = 4096;
+
+/// Room that sorting takes, kept from one time to the next.
+#[derive(Clone, Debug, Default)]
+struct Sorting {
+    cells: Vec<u32>,
+    next: Vec<u32>,
+    order: Vec<u32>,
+    pairs: Vec<[f64; 2]>,
+    numbers: Vec<f64>,
+    bytes: Vec<u8>,
+    flags: Vec<bool>,
+}
+
+impl Sorting {
+    /// Brings a column into the new order.
+    fn permute<T: Sortable>(&mut self, column: &mut Vec<T>) {
+        let mut room = std::mem::take(T::room(self));
+        room.clear();
+        room.extend(self.order.iter().map(|&p| column[p as usize]));
+        std::mem::swap(column, &mut room);
+        *T::room(self) = room;
+    }
+}
+
+/// What a column can hold.
+trait Sortable: Copy {
+    fn room(sorting: &mut Sorting) -> &mut Vec<Self>;
+}
+
+macro_rules! sortable {
+    ($($type:ty: $room:ident),*) => {$(
+        impl Sortable for $type {
+            fn room(sorting: &mut Sorting) -> &mut Vec<Self> {
+                &mut sorting.$room
+            }
+        }
+    )*};
+}
+sortable!([f64; 2]: pairs, f64: numbers, u8: bytes, bool: flags);
 
 /// Runs a block for each optional column that exists.
 macro_rules! for_columns {
@@ -90,25 +134,30 @@ impl Particles {
 
     /// Sorts by cell (stable counting sort) and fills `cell_start`.
     pub fn sort(&mut self, mesh: &Mesh) {
-        let cells: Vec<u32> = self.position.iter().map(|&p| mesh.locate(p) as u32).collect();
+        let Sorting { cells, next, order, .. } = &mut self.sorting;
+        cells.resize(self.position.len(), 0);
+        let position = &self.position;
+        threads::for_each(cells, GRAIN, |p, cell| *cell = mesh.locate(position[p]) as u32);
         self.cell_start.clear();
         self.cell_start.resize(mesh.cells() + 1, 0);
-        for &c in &cells {
+        for &c in &*cells {
             self.cell_start[c as usize + 1] += 1;
         }
         for c in 0..mesh.cells() {
             self.cell_start[c + 1] += self.cell_start[c];
         }
-        if cells.windows(2).all(|w| w[0] <= w[1]) {
+        if cells.is_sorted() {
             return;
         }
-        let mut next = self.cell_start.clone();
-        let mut order = vec![0u32; cells.len()];
+        next.clone_from(&self.cell_start);
+        order.resize(cells.len(), 0);
         for (p, &c) in cells.iter().enumerate() {
             order[next[c as usize] as usize] = p as u32;
             next[c as usize] += 1;
         }
-        for_columns!(&mut *self, |c| *c = order.iter().map(|&p| c[p as usize]).collect());
+        let mut sorting = std::mem::take(&mut self.sorting);
+        for_columns!(&mut *self, |c| sorting.permute(c));
+        self.sorting = sorting;
     }
 
     /// Total volume of each of `materials` materials.

@@ -17,11 +17,15 @@ use super::particles::Particles;
 use super::seeding::Seeding;
 use super::walls::Enclosure;
 use crate::laws::director;
+use crate::threads;
 
 /// Particles of this share of the usual volume are split before smaller ones, which would make
 /// volumes ever more unequal: after 10,000 steps of a steady vortex, cells of 16 were off by 1.01 rows
 /// of particles with a quarter, and are by 0.91 with this (at random places they would be by 0.8).
 const SPLIT: f64 = 0.7;
+
+/// Cells that are worth a task of their own.
+const GRAIN: usize = 256;
 
 /// Shifted particles stay within this, in half cells.
 const INSIDE: f64 = 0.999;
@@ -64,11 +68,12 @@ impl Population {
     fn split(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
         let before = particles.len();
         let least = (self.target() / 2).max(1);
-        for cell in 0..mesh.cells() {
+        let mut lacking = vec![false; mesh.cells()];
+        threads::for_each(&mut lacking, GRAIN, |cell, lacks| {
+            *lacks = self.lacks(mesh, particles, cell, least);
+        });
+        for cell in (0..mesh.cells()).filter(|&c| lacking[c]) {
             let mut members: Vec<usize> = particles.of_cell(cell).collect();
-            if members.is_empty() {
-                continue;
-            }
             let nominal = mesh.cell_area(cell) / self.target() as f64;
             while let Some(gap) = self.gap(mesh, particles, cell, &members, least) {
                 let parent = nearest(mesh, particles, cell, &members, gap, SPLIT * nominal);
@@ -110,6 +115,23 @@ impl Population {
         any
     }
 
+    /// Whether a cell that holds particles has too few, or none in a quadrant.
+    fn lacks(&self, mesh: &Mesh, particles: &Particles, cell: usize, least: usize) -> bool {
+        let members = particles.of_cell(cell);
+        if members.len() < least {
+            return !members.is_empty();
+        }
+        let (centre, [hx, hy]) = (mesh.cell_centre(cell), mesh.cell_size(cell));
+        let mut held = [false; 4];
+        for p in &particles.position[members] {
+            let r = [2.0 * (p[0] - centre[0]) / hx, 2.0 * (p[1] - centre[1]) / hy];
+            for (q, held) in held.iter_mut().enumerate() {
+                *held |= holds(&quadrant(q), &r);
+            }
+        }
+        self.target() >= 4 && held.contains(&false)
+    }
+
     /// A place (reference coordinates) that lacks a particle: in an empty quadrant, or, where
     /// the cell has too few, the lattice point farthest from all.
     fn gap(
@@ -123,10 +145,7 @@ impl Population {
         let places: Vec<[f64; 2]> =
             members.iter().map(|&p| mesh.to_reference(cell, particles.position[p])).collect();
         if self.target() >= 4 {
-            let centres = (0..4).map(|q| [(q % 2) as f64 - 0.5, (q / 2) as f64 - 0.5]);
-            // A particle on the line between two quadrants is in both.
-            let holds = |c: &[f64; 2], r: &[f64; 2]| (0..2).all(|k| c[k] * r[k] > -SAME);
-            let empty = centres.filter(|c| !places.iter().any(|r| holds(c, r)));
+            let empty = (0..4).map(quadrant).filter(|c| !places.iter().any(|r| holds(c, r)));
             let first =
                 cheapest(empty.map(|c| (0.0, from_middle(mesh, mesh.from_reference(cell, c)), c)));
             if first.is_some() {
@@ -169,6 +188,9 @@ impl Population {
         let mut gone = vec![false; particles.len()];
         let mut any = false;
         for cell in 0..mesh.cells() {
+            if particles.of_cell(cell).len() <= most {
+                continue;
+            }
             let mut members: Vec<usize> = particles.of_cell(cell).collect();
             while members.len() > most {
                 let Some((a, b)) = closest_pair(mesh, particles, cell, &members) else { break };
@@ -184,6 +206,16 @@ impl Population {
             particles.sort(mesh);
         }
     }
+}
+
+/// Centre of a quadrant in reference coordinates.
+fn quadrant(q: usize) -> [f64; 2] {
+    [(q % 2) as f64 - 0.5, (q / 2) as f64 - 0.5]
+}
+
+/// Whether the quadrant around `centre` holds a place; one on the line between two is in both.
+fn holds(centre: &[f64; 2], r: &[f64; 2]) -> bool {
+    (0..2).all(|k| centre[k] * r[k] > -SAME)
 }
 
 /// The member nearest to a place among those of at least `least_volume`; failing that, the

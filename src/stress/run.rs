@@ -4,6 +4,7 @@ use super::{CRITERIA, Outcome, Trial, Verdict, judge};
 use crate::cases::{CaseError, plan_of};
 use crate::sim::{self, Run};
 use crate::space::mesh::Axis;
+use crate::threads;
 use crate::verify::{Bound, Check};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -178,7 +179,7 @@ pub fn run_all(trials: &[Trial], announce: impl Fn(usize, &Outcome) + Sync) -> V
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(trial) = trials.get(index) else { return };
-            let outcome = trial.run();
+            let outcome = threads::alone(|| trial.run());
             let mut done = done.lock().unwrap_or_else(|e| e.into_inner());
             announce(done.len() + 1, &outcome);
             done.push((index, outcome));

@@ -1,0 +1,191 @@
+//! Element matrices of all cells, computed again only where something changed.
+
+use super::buoyancy::{FaceTerm, Restoring, SIDE_NODES};
+use super::element::{
+    CellBlocks, Centre, Divergence, LOCAL, Matrix, Nodal, PointShape, add_cut_stiffness,
+    add_stiffness, condense, mirror, pair, pressure_mass,
+};
+use super::quadrature::{Content, Quadrature};
+use super::spin::SpinModes;
+use crate::space::constraints::Constraints;
+use crate::space::incidence::Incidence;
+use crate::space::mesh::Mesh;
+use crate::space::shape::{CENTRE, NODES};
+use crate::threads;
+
+/// Penalty `r` of the augmented Lagrangian in units of the cell's viscosity.
+const PENALTY: f64 = 1e6;
+
+/// Cells that are worth a task of their own.
+const GRAIN: usize = 16;
+
+/// What the corrections need of a cell besides its blocks.
+#[derive(Clone, Copy)]
+pub struct CellMatrix<const D: usize> {
+    pub centre: Centre<D>,
+    /// Of the matrix without the penalty.
+    pub diagonal: Nodal<D>,
+    /// `W = (C + Mp / (r eta))^-1`
+    pub penalty: [f64; 3],
+}
+
+/// The matrices of all cells.
+pub struct Matrices<const D: usize> {
+    pub cells: Vec<CellMatrix<D>>,
+    /// Of the skeleton, centres condensed and all terms added: what is factored.
+    pub blocks: Vec<CellBlocks<D>>,
+    built_from: Vec<Content>,
+    /// Those that were computed at the last update.
+    fresh: Vec<Fresh<D>>,
+}
+
+struct Fresh<const D: usize> {
+    cell: usize,
+    matrix: CellMatrix<D>,
+    blocks: CellBlocks<D>,
+}
+
+/// What matrices are made from.
+#[derive(Clone, Copy)]
+pub struct Ingredients<'a, const D: usize> {
+    pub mesh: &'a Mesh,
+    pub incidence: &'a Incidence,
+    pub constraints: &'a Constraints<D>,
+    pub quadrature: &'a Quadrature,
+    pub restoring: &'a Restoring,
+}
+
+impl<const D: usize> CellMatrix<D> {
+    const ZERO: Self = CellMatrix {
+        centre: Centre { inverse: [[0.0; D]; D], coupling: [[[0.0; D]; D]; 8] },
+        diagonal: [[0.0; D]; NODES],
+        penalty: [0.0; 3],
+    };
+}
+
+impl<const D: usize> Matrices<D> {
+    const NO_BLOCKS: CellBlocks<D> = [[[0.0; D]; D]; 36];
+
+    pub fn new(cells: usize) -> Self {
+        Matrices {
+            cells: vec![CellMatrix::ZERO; cells],
+            blocks: vec![Self::NO_BLOCKS; cells],
+            built_from: vec![Content::Unknown; cells],
+            fresh: vec![],
+        }
+    }
+
+    /// Computes the matrices of cells whose content changed, and calls `changed` for those that
+    /// are not, bit for bit, what they were.
+    pub fn update(&mut self, from: Ingredients<D>, mut changed: impl FnMut(usize)) {
+        self.fresh.clear();
+        // Terms of faces come on top of what the content says.
+        for face in &from.restoring.faces {
+            self.built_from[face.cell] = Content::Unknown;
+        }
+        for (cell, built_from) in self.built_from.iter_mut().enumerate() {
+            let content = from.quadrature.content(cell);
+            let known = content != Content::Mixed && content == *built_from;
+            if content != Content::Solid && !known {
+                let blocks = Self::NO_BLOCKS;
+                self.fresh.push(Fresh { cell, matrix: CellMatrix::ZERO, blocks });
+                *built_from = content;
+            }
+        }
+        threads::for_each(&mut self.fresh, GRAIN, |_, fresh| fresh.build(from));
+        for face in &from.restoring.faces {
+            self.built_from[face.cell] = Content::Unknown;
+            if let Ok(k) = self.fresh.binary_search_by_key(&face.cell, |f| f.cell) {
+                self.fresh[k].add_face(from, face);
+            }
+        }
+        for fresh in &self.fresh {
+            self.cells[fresh.cell] = fresh.matrix;
+            let before = &mut self.blocks[fresh.cell];
+            let bits = |b: &CellBlocks<D>, k: usize| b[k].map(|row| row.map(f64::to_bits));
+            if (0..before.len()).any(|k| bits(before, k) != bits(&fresh.blocks, k)) {
+                *before = fresh.blocks;
+                changed(fresh.cell);
+            }
+        }
+    }
+}
+
+impl<const D: usize> Fresh<D> {
+    fn build(&mut self, from: Ingredients<D>) {
+        let Ingredients { mesh, incidence, constraints, quadrature, restoring } = from;
+        let cell = self.cell;
+        let size = mesh.cell_size(cell);
+        let area = size[0] * size[1];
+        let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
+        let cut = quadrature.cut(cell);
+        // What a stiff rotation adds to the viscosity of a flow on the scale of the cell.
+        let (mut turning, thickness) = (0.0, size[0].min(size[1]));
+        quadrature.for_points(cell, |p, shape| {
+            let law = p.law.without_excess();
+            let law = cut.map_or(law, |cut| law.with_viscosity_scaled(cut.rest));
+            add_stiffness::<D>(&mut k, &PointShape::new(shape, size), &law, p.weight * area);
+            turning += p.weight * p.law.turning_viscosity(thickness);
+        });
+        if let Some(cut) = cut {
+            add_cut_stiffness(&mut k, cut);
+        }
+        if D == 3
+            && let Some(modes) = SpinModes::new(quadrature, cell, size)
+        {
+            modes.add_stiffness(&mut k);
+        }
+        if restoring.cell_strength(cell) > 0.0 {
+            for i in 0..2 * NODES {
+                for j in 0..NODES * (i / NODES + 1) {
+                    let (nodes, components) = ([i % NODES, j % NODES], [i / NODES, j / NODES]);
+                    k[i][j] += restoring.cell_entry(cell, nodes, components);
+                }
+            }
+        }
+        let mass = pressure_mass(area);
+        let viscosity = quadrature.mean_viscosity[cell] + if D == 3 { turning } else { 0.0 };
+        let give = 1.0 / (PENALTY * viscosity) + quadrature.compliance[cell];
+        self.matrix.penalty = mass.map(|m| 1.0 / (m * give));
+        for a in 0..NODES {
+            for c in 0..D {
+                self.matrix.diagonal[a][c] = k[NODES * c + a][NODES * c + a];
+            }
+        }
+        Divergence::new(size).add_penalty(&self.matrix.penalty, &mut k);
+        mirror::<D>(&mut k);
+        for (a, node) in incidence.nodes[cell].into_iter().enumerate() {
+            for c in 0..D {
+                if constraints.is_fixed(node, c) {
+                    let i = NODES * c + a;
+                    k[i].fill(0.0);
+                    k.iter_mut().for_each(|row| row[i] = 0.0);
+                }
+            }
+        }
+        (self.blocks, self.matrix.centre) = condense(&k);
+    }
+
+    /// Adds the term of a face, whose nodes the skeleton has all.
+    fn add_face(&mut self, from: Ingredients<D>, face: &FaceTerm) {
+        let nodes = &from.incidence.nodes[face.cell];
+        for (k, &a) in SIDE_NODES[face.normal].iter().enumerate() {
+            for c in 0..2 {
+                self.matrix.diagonal[a][c] += from.restoring.entry(face, [k, k], [c, c]);
+            }
+            for (l, &b) in SIDE_NODES[face.normal].iter().enumerate().take(k + 1) {
+                // Local nodes without the centre.
+                let [i, j] = [a, b].map(|n| n - usize::from(n > CENTRE));
+                let block = &mut self.blocks[pair(i, j)];
+                for r in 0..2 {
+                    for c in 0..2 {
+                        let fixed = [(a, r), (b, c)].map(|(n, c)| (nodes[n], c));
+                        if !fixed.iter().any(|&(n, c)| from.constraints.is_fixed(n, c)) {
+                            block[r][c] += from.restoring.entry(face, [k, l], [r, c]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! One front: its dense matrix, its elimination, its part of the substitutions.
+//!
+//! ```text
+//! [ F11  .   ]     F11 = L11 L11',   L21 = F21 L11^-T,   U = F22 - L21 L21'
+//! [ F21  F22 ]
+//! ```
+//! `F11` and `F21` are the *panel*, in whose place the columns of the factor come; `F22`, of which
+//! only the lower triangle matters, is the *update* that the parent is assembled from. The update is
+//! stored in blocks of [`BLOCK`] columns, each from its first diagonal entry down.
+
+use super::kernels::{self, Columns, ColumnsMut, PANEL, Product, Simd};
+use super::tree::Run;
+
+/// Columns of a block of an update.
+const BLOCK: usize = 64;
+
+/// Columns of the panel that are brought up to date together.
+const WIDE: usize = 8 * PANEL;
+
+/// Unknowns of a front.
+#[derive(Clone, Copy, Debug)]
+pub struct Size {
+    pub own: usize,
+    pub rim: usize,
+}
+
+impl Size {
+    pub fn rows(self) -> usize {
+        self.own + self.rim
+    }
+    pub fn panel(self) -> usize {
+        self.own * self.rows()
+    }
+    /// Entries of the stored update.
+    pub fn update(self) -> usize {
+        update_len(self.rim)
+    }
+}
+
+/// Entries of an update of `rim` unknowns.
+fn update_len(rim: usize) -> usize {
+    let (full, rest) = (rim / BLOCK, rim % BLOCK);
+    block_start(rim, full) + rest * rest
+}
+
+/// Where block `k` of columns starts, and the rows it has.
+fn block_start(rim: usize, k: usize) -> usize {
+    BLOCK * k * rim - BLOCK * BLOCK * (k * k - k) / 2
+}
+
+/// Where column `j` of an update has its entry in row `j`.
+fn column_start(rim: usize, j: usize) -> usize {
+    let k = j / BLOCK;
+    let within = j - k * BLOCK;
+    block_start(rim, k) + within * (rim - k * BLOCK) + within
+}
+
+/// The matrix of a front.
+pub struct Matrix<'a> {
+    pub size: Size,
+    pub panel: &'a mut [f64],
+    pub update: &'a mut [f64],
+}
+
+impl Matrix<'_> {
+    pub fn clear(&mut self) {
+        self.panel.fill(0.0);
+        self.update.fill(0.0);
+    }
+
+    /// Entries of a column from row `i` on, `i` not above the diagonal.
+    fn column_from(&mut self, j: usize, i: usize) -> &mut [f64] {
+        let Size { own, rim } = self.size;
+        if j < own {
+            let rows = own + rim;
+            &mut self.panel[j * rows + i..(j + 1) * rows]
+        } else {
+            let (i, j) = (i - own, j - own);
+            let start = column_start(rim, j) + (i - j);
+            &mut self.update[start..start + rim - i]
+        }
+    }
+
+    /// Adds a block of `D` unknowns of each of two nodes; `transposed` if the entry of row node's
+    /// unknown `r` and column node's unknown `c` is `block[c][r]`.
+    pub fn add_block<const D: usize>(
+        &mut self,
+        [row, column]: [usize; 2],
+        block: &[[f64; D]; D],
+        transposed: bool,
+    ) {
+        for c in 0..D {
+            let from = if row == column { c } else { 0 };
+            let target = self.column_from(D * column + c, D * row + from);
+            for r in from..D {
+                target[r - from] += if transposed { block[c][r] } else { block[r][c] };
+            }
+        }
+    }
+
+    /// Adds a child's update.
+    pub fn add_update<const D: usize>(&mut self, rim: usize, update: &[f64], runs: &[Run]) {
+        for (at, run) in runs.iter().enumerate() {
+            for k in 0..D * run.len as usize {
+                let j = D * run.child as usize + k;
+                let column = &update[column_start(rim, j)..];
+                let to = D * run.parent as usize + k;
+                // The rest of this run, then those after it.
+                let rest = D * run.len as usize - k;
+                add(&mut self.column_from(to, to)[..rest], &column[..rest]);
+                for other in &runs[at + 1..] {
+                    let len = D * other.len as usize;
+                    let from = D * other.child as usize - j;
+                    let to = &mut self.column_from(to, D * other.parent as usize)[..len];
+                    add(to, &column[from..from + len]);
+                }
+            }
+        }
+    }
+
+    /// Eliminates the own unknowns; the index of one whose pivot is not positive.
+    pub fn eliminate(&mut self, simd: Simd) -> Result<(), usize> {
+        let Size { own, rim } = self.size;
+        let ld = own + rim;
+        let mut k = 0;
+        while k < own {
+            let width = WIDE.min(own - k);
+            self.eliminate_columns(simd, k, width)?;
+            k += width;
+        }
+        let mut j = 0;
+        while j < rim {
+            let width = BLOCK.min(rim - j);
+            let c =
+                ColumnsMut { data: &mut self.update[block_start(rim, j / BLOCK)..], ld: rim - j };
+            let l = Columns { data: &self.panel[own + j..], ld };
+            let size = Product { rows: rim - j, columns: width, depth: own };
+            kernels::subtract_square(simd, c, l, size);
+            j += width;
+        }
+        Ok(())
+    }
+
+    /// Columns `k..k + width` of the panel, after those before them.
+    fn eliminate_columns(&mut self, simd: Simd, k: usize, width: usize) -> Result<(), usize> {
+        let ld = self.size.rows();
+        let rows = ld - k;
+        let (before, here) = self.panel.split_at_mut(k * ld);
+        if k > 0 {
+            let l = Columns { data: &before[k..], ld };
+            let c = ColumnsMut { data: &mut here[k..], ld };
+            kernels::subtract_square(simd, c, l, Product { rows, columns: width, depth: k });
+        }
+        let mut j = 0;
+        while j < width {
+            let columns = PANEL.min(width - j);
+            let at = k + j;
+            let (before, here) = here.split_at_mut(j * ld);
+            if j > 0 {
+                let l = Columns { data: &before[at..], ld };
+                let c = ColumnsMut { data: &mut here[at..], ld };
+                kernels::subtract_square(simd, c, l, Product { rows: ld - at, columns, depth: j });
+            }
+            let c = ColumnsMut { data: &mut here[at..], ld };
+            kernels::factor_panel(simd, c, ld - at, columns).map_err(|i| at + i)?;
+            j += columns;
+        }
+        Ok(())
+    }
+}
+
+fn add(to: &mut [f64], from: &[f64]) {
+    for (t, f) in to.iter_mut().zip(from) {
+        *t += f;
+    }
+}

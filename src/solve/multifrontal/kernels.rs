@@ -1,0 +1,488 @@
+//! Dense kernels on columns, for the widest vectors that the processor has.
+//!
+//! Each kernel is written once, over short arrays that a compiler turns into vectors, and compiled
+//! for AVX-512, for AVX2 and for what every processor of the target has; the processor is asked at
+//! run time. Matrices are stored column by column: entry `(i, j)` is at `i + j ld`.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
+
+/// Columns of a panel that are eliminated together.
+pub const PANEL: usize = 8;
+
+/// From this many multiplications per column and this depth on faer's packed product is faster.
+const PACKED_DEPTH: usize = 48;
+const PACKED_ROWS: usize = 96;
+
+/// Instruction sets that kernels are compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Simd {
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    Portable,
+}
+
+impl Simd {
+    /// The best that this processor has.
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("fma")
+            {
+                return Simd::Avx512;
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                return Simd::Avx2;
+            }
+        }
+        Simd::Portable
+    }
+}
+
+/// Columns of a matrix, to be read.
+#[derive(Clone, Copy)]
+pub struct Columns<'a> {
+    pub data: &'a [f64],
+    pub ld: usize,
+}
+
+/// Columns of a matrix, to be written.
+pub struct ColumnsMut<'a> {
+    pub data: &'a mut [f64],
+    pub ld: usize,
+}
+
+/// Size of a product `A B'`: `A` has `rows` rows, `B` has `columns`, both have `depth` columns.
+#[derive(Clone, Copy)]
+pub struct Product {
+    pub rows: usize,
+    pub columns: usize,
+    pub depth: usize,
+}
+
+/// Defines a function that runs a kernel as compiled for an instruction set.
+///
+/// SAFETY of the calls: `Simd::Avx512` and `Simd::Avx2` are made by [`Simd::detect`] only after the
+/// processor said that it has the features which the callee is compiled with; the callee itself is
+/// safe code.
+macro_rules! dispatch {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $kernel:ident) => {
+        $(#[$doc])*
+        $vis fn $name(simd: Simd, $($arg: $type),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
+            fn avx512($($arg: $type),*) $(-> $out)? {
+                $kernel::<16, true>($($arg),*)
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,fma")]
+            fn avx2($($arg: $type),*) $(-> $out)? {
+                $kernel::<8, true>($($arg),*)
+            }
+            match simd {
+                #[cfg(target_arch = "x86_64")]
+                #[allow(unsafe_code)]
+                Simd::Avx512 => unsafe { avx512($($arg),*) },
+                #[cfg(target_arch = "x86_64")]
+                #[allow(unsafe_code)]
+                Simd::Avx2 => unsafe { avx2($($arg),*) },
+                Simd::Portable => {
+                    $kernel::<8, { cfg!(any(target_arch = "aarch64", target_feature = "fma")) }>($($arg),*)
+                }
+            }
+        }
+    };
+}
+
+dispatch! {
+    /// `C -= A B'` on and below the diagonal, where `B` is the first rows of `A`.
+    fn subtract_small(c: ColumnsMut, a: Columns, size: Product) = subtract_square_kernel
+}
+dispatch! {
+    /// Eliminates the first columns, at most [`PANEL`], of a matrix of `rows` rows: afterwards they
+    /// are columns of its Cholesky factor, with the inverse of each pivot in its place.
+    pub fn factor_panel(c: ColumnsMut, rows: usize, columns: usize) -> Result<(), usize>
+        = factor_panel_kernel
+}
+dispatch! {
+    /// Forward substitution with columns of a factor: `x` becomes `L1^-1 x`, and what is left is
+    /// taken from `rest`: `rest -= L2 x`.
+    pub fn forward(l: Columns, x: &mut [f64], rest: &mut [f64]) = forward_kernel
+}
+dispatch! {
+    /// Backward substitution: `x` becomes `L1^-T (x - L2' rest)`.
+    pub fn backward(l: Columns, x: &mut [f64], rest: &[f64]) = backward_kernel
+}
+
+/// `C -= A B'` on and below the diagonal, where `B` is the first rows of `A`: below the first
+/// square large ones by faer's packed product.
+pub fn subtract_square(simd: Simd, c: ColumnsMut, a: Columns, size: Product) {
+    let Product { rows, columns, depth } = size;
+    if depth < PACKED_DEPTH || rows < PACKED_ROWS {
+        return subtract_small(simd, c, a, size);
+    }
+    let ColumnsMut { data, ld } = c;
+    subtract_small(simd, ColumnsMut { data, ld }, a, Product { rows: columns, ..size });
+    if rows > columns {
+        let below = rows - columns;
+        matmul(
+            MatMut::from_column_major_slice_with_stride_mut(
+                &mut data[columns..],
+                below,
+                columns,
+                ld,
+            ),
+            Accum::Add,
+            MatRef::from_column_major_slice_with_stride(&a.data[columns..], below, depth, a.ld),
+            MatRef::from_column_major_slice_with_stride(a.data, columns, depth, a.ld).transpose(),
+            -1.0,
+            Par::Seq,
+        );
+    }
+}
+
+/// `c - a b`, in one rounding where that is an instruction.
+#[inline(always)]
+fn negated_product<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FMA { (-a).mul_add(b, c) } else { c - a * b }
+}
+
+#[inline(always)]
+fn array<const N: usize>(data: &[f64], at: usize) -> &[f64; N] {
+    match data[at..at + N].try_into() {
+        Ok(a) => a,
+        Err(_) => unreachable!("a slice of N has N entries"),
+    }
+}
+
+#[inline(always)]
+fn array_mut<const N: usize>(data: &mut [f64], at: usize) -> &mut [f64; N] {
+    match (&mut data[at..at + N]).try_into() {
+        Ok(a) => a,
+        Err(_) => unreachable!("a slice of N has N entries"),
+    }
+}
+
+#[inline(always)]
+fn subtract_square_kernel<const R: usize, const FMA: bool>(
+    c: ColumnsMut,
+    a: Columns,
+    Product { rows, columns, depth }: Product,
+) {
+    let mut j = 0;
+    while j < columns {
+        let here = ColumnsMut { data: &mut c.data[j * c.ld..], ld: c.ld };
+        let b = Columns { data: &a.data[j..], ld: a.ld };
+        if j + 4 <= columns {
+            strip::<R, 4, FMA>(here, a, b, [j, rows], depth);
+            j += 4;
+        } else if j + 2 <= columns {
+            strip::<R, 2, FMA>(here, a, b, [j, rows], depth);
+            j += 2;
+        } else {
+            strip::<R, 1, FMA>(here, a, b, [j, rows], depth);
+            j += 1;
+        }
+    }
+}
+
+/// Rows `from..to` of `C` columns.
+#[inline(always)]
+fn strip<const R: usize, const C: usize, const FMA: bool>(
+    mut c: ColumnsMut,
+    a: Columns,
+    b: Columns,
+    [from, to]: [usize; 2],
+    depth: usize,
+) {
+    let mut i = from;
+    while i + R <= to {
+        tile::<R, C, FMA>(&mut c, a, b, i, depth);
+        i += R;
+    }
+    if R > 8 && i + 8 <= to {
+        tile::<8, C, FMA>(&mut c, a, b, i, depth);
+        i += 8;
+    }
+    if i + 4 <= to {
+        tile::<4, C, FMA>(&mut c, a, b, i, depth);
+        i += 4;
+    }
+    if i + 2 <= to {
+        tile::<2, C, FMA>(&mut c, a, b, i, depth);
+        i += 2;
+    }
+    if i < to {
+        tile::<1, C, FMA>(&mut c, a, b, i, depth);
+    }
+}
+
+#[inline(always)]
+fn tile<const R: usize, const C: usize, const FMA: bool>(
+    c: &mut ColumnsMut,
+    a: Columns,
+    b: Columns,
+    i: usize,
+    depth: usize,
+) {
+    let mut sum: [[f64; R]; C] = std::array::from_fn(|j| *array(c.data, i + j * c.ld));
+    for k in 0..depth {
+        let a: &[f64; R] = array(a.data, i + k * a.ld);
+        let b: &[f64; C] = array(b.data, k * b.ld);
+        for j in 0..C {
+            for r in 0..R {
+                sum[j][r] = negated_product::<FMA>(a[r], b[j], sum[j][r]);
+            }
+        }
+    }
+    for j in 0..C {
+        *array_mut(c.data, i + j * c.ld) = sum[j];
+    }
+}
+
+#[inline(always)]
+fn factor_panel_kernel<const R: usize, const FMA: bool>(
+    c: ColumnsMut,
+    rows: usize,
+    columns: usize,
+) -> Result<(), usize> {
+    let ColumnsMut { data, ld } = c;
+    // The block on the diagonal, entry (i, j) at [j][i].
+    let mut l = [[0.0; PANEL]; PANEL];
+    let mut inverse = [0.0; PANEL];
+    for j in 0..columns {
+        for i in j..columns {
+            let mut s = data[i + j * ld];
+            for k in 0..j {
+                s = negated_product::<FMA>(l[k][i], l[k][j], s);
+            }
+            l[j][i] = s;
+        }
+        // Nothing acts on this unknown: it stays what it is.
+        if l[j][j] == 0.0 {
+            l[j][j] = 1.0;
+        }
+        if !(l[j][j] > 0.0 && l[j][j].is_finite()) {
+            return Err(j);
+        }
+        let root = l[j][j].sqrt();
+        inverse[j] = 1.0 / root;
+        l[j][j] = root;
+        for i in j + 1..columns {
+            l[j][i] *= inverse[j];
+        }
+        data[j + j * ld] = inverse[j];
+        for i in j + 1..columns {
+            data[i + j * ld] = l[j][i];
+        }
+    }
+    let mut i = columns;
+    if columns == PANEL {
+        while i + 8 <= rows {
+            below::<8, FMA>(data, ld, i, &l, &inverse);
+            i += 8;
+        }
+        while i + 2 <= rows {
+            below::<2, FMA>(data, ld, i, &l, &inverse);
+            i += 2;
+        }
+    }
+    for i in i..rows {
+        let mut x = [0.0; PANEL];
+        for j in 0..columns {
+            let mut s = data[i + j * ld];
+            for k in 0..j {
+                s = negated_product::<FMA>(x[k], l[k][j], s);
+            }
+            x[j] = s * inverse[j];
+            data[i + j * ld] = x[j];
+        }
+    }
+    Ok(())
+}
+
+/// Rows below a full diagonal block: `X L' = A`.
+#[inline(always)]
+fn below<const R: usize, const FMA: bool>(
+    data: &mut [f64],
+    ld: usize,
+    i: usize,
+    l: &[[f64; PANEL]; PANEL],
+    inverse: &[f64; PANEL],
+) {
+    let mut x = [[0.0; R]; PANEL];
+    for j in 0..PANEL {
+        let column: &mut [f64; R] = array_mut(data, i + j * ld);
+        let mut s = *column;
+        for k in 0..j {
+            for r in 0..R {
+                s[r] = negated_product::<FMA>(x[k][r], l[k][j], s[r]);
+            }
+        }
+        for r in 0..R {
+            x[j][r] = s[r] * inverse[j];
+        }
+        *column = x[j];
+    }
+}
+
+#[inline(always)]
+fn forward_kernel<const R: usize, const FMA: bool>(l: Columns, x: &mut [f64], rest: &mut [f64]) {
+    let own = x.len();
+    let mut k = 0;
+    while k < own {
+        let width = PANEL.min(own - k);
+        let (done, ahead) = x[k..].split_at_mut(width);
+        let top = &l.data[k * l.ld + k..];
+        for j in 0..width {
+            let column = &top[j * l.ld..j * l.ld + width];
+            let xj = done[j] * column[j];
+            done[j] = xj;
+            for i in j + 1..width {
+                done[i] = negated_product::<FMA>(column[i], xj, done[i]);
+            }
+        }
+        let below = Columns { data: &top[width..], ld: l.ld };
+        let rim = Columns { data: &l.data[k * l.ld + own..], ld: l.ld };
+        let mut j = 0;
+        while j < width {
+            let wide = part_of_panel(width - j);
+            for (a, y) in [(below, &mut *ahead), (rim, &mut *rest)] {
+                let (a, x) = (a.from_column(j), &done[j..]);
+                match wide {
+                    8 => subtract_columns::<8, FMA>(a, x, y),
+                    4 => subtract_columns::<4, FMA>(a, x, y),
+                    2 => subtract_columns::<2, FMA>(a, x, y),
+                    _ => subtract_columns::<1, FMA>(a, x, y),
+                }
+            }
+            j += wide;
+        }
+        k += width;
+    }
+}
+
+/// Columns of a panel that are taken together.
+#[inline(always)]
+fn part_of_panel(columns: usize) -> usize {
+    match columns {
+        8.. => 8,
+        4.. => 4,
+        2.. => 2,
+        _ => 1,
+    }
+}
+
+impl<'a> Columns<'a> {
+    #[inline(always)]
+    fn from_column(self, j: usize) -> Columns<'a> {
+        Columns { data: &self.data[(j * self.ld).min(self.data.len())..], ld: self.ld }
+    }
+
+    /// The first `rows` of each of the first columns.
+    #[inline(always)]
+    fn first<const W: usize>(self, rows: usize) -> [&'a [f64]; W] {
+        std::array::from_fn(|k| &self.data[k * self.ld..k * self.ld + rows])
+    }
+}
+
+/// `y -= A x` for the first `W` columns.
+#[inline(always)]
+fn subtract_columns<const W: usize, const FMA: bool>(a: Columns, x: &[f64], y: &mut [f64]) {
+    let rows = y.len();
+    if rows == 0 {
+        return;
+    }
+    let x: &[f64; W] = array(x, 0);
+    let columns = a.first::<W>(rows);
+    let mut i = 0;
+    while i + 8 <= rows {
+        let y: &mut [f64; 8] = array_mut(y, i);
+        let mut s = *y;
+        for k in 0..W {
+            let c: &[f64; 8] = array(columns[k], i);
+            for r in 0..8 {
+                s[r] = negated_product::<FMA>(c[r], x[k], s[r]);
+            }
+        }
+        *y = s;
+        i += 8;
+    }
+    for i in i..rows {
+        for k in 0..W {
+            y[i] = negated_product::<FMA>(columns[k][i], x[k], y[i]);
+        }
+    }
+}
+
+#[inline(always)]
+fn backward_kernel<const R: usize, const FMA: bool>(l: Columns, x: &mut [f64], rest: &[f64]) {
+    let own = x.len();
+    let mut k = own;
+    while k > 0 {
+        // The narrow panel, if there is one, is the last.
+        let width = if k % PANEL == 0 { PANEL } else { k % PANEL };
+        k -= width;
+        let (done, ahead) = x[k..].split_at_mut(width);
+        let top = &l.data[k * l.ld + k..];
+        let below = Columns { data: &top[width..], ld: l.ld };
+        let rim = Columns { data: &l.data[k * l.ld + own..], ld: l.ld };
+        let mut j = 0;
+        while j < width {
+            let wide = part_of_panel(width - j);
+            for (a, y) in [(below, &*ahead), (rim, rest)] {
+                let (a, x) = (a.from_column(j), &mut done[j..]);
+                match wide {
+                    8 => subtract_products::<8, FMA>(a, y, x),
+                    4 => subtract_products::<4, FMA>(a, y, x),
+                    2 => subtract_products::<2, FMA>(a, y, x),
+                    _ => subtract_products::<1, FMA>(a, y, x),
+                }
+            }
+            j += wide;
+        }
+        for j in (0..width).rev() {
+            let column = &top[j * l.ld..j * l.ld + width];
+            let mut s = done[j];
+            for i in j + 1..width {
+                s = negated_product::<FMA>(column[i], done[i], s);
+            }
+            done[j] = s * column[j];
+        }
+    }
+}
+
+/// `x -= A' y` for the first `W` columns.
+#[inline(always)]
+fn subtract_products<const W: usize, const FMA: bool>(a: Columns, y: &[f64], x: &mut [f64]) {
+    let rows = y.len();
+    if rows == 0 {
+        return;
+    }
+    let columns = a.first::<W>(rows);
+    let mut sum = [[0.0; 8]; W];
+    let mut i = 0;
+    while i + 8 <= rows {
+        let y: &[f64; 8] = array(y, i);
+        for k in 0..W {
+            let c: &[f64; 8] = array(columns[k], i);
+            for r in 0..8 {
+                sum[k][r] = negated_product::<FMA>(c[r], y[r], sum[k][r]);
+            }
+        }
+        i += 8;
+    }
+    for k in 0..W {
+        let quarter: [f64; 4] = std::array::from_fn(|r| sum[k][r] + sum[k][r + 4]);
+        let mut s = (quarter[0] + quarter[2]) + (quarter[1] + quarter[3]);
+        for i in i..rows {
+            s = negated_product::<FMA>(columns[k][i], y[i], s);
+        }
+        x[k] += s;
+    }
+}

@@ -1,0 +1,491 @@
+//! Multifrontal Cholesky factorisation of the skeleton matrix of a structured mesh.
+//!
+//! The matrix is never assembled. Every cell hands in its element matrix; the fronts of the
+//! dissection ([`tree`]) add up the matrices of their cells or their children's updates, eliminate
+//! their own unknowns ([`front`]) and hand an update on. With 2 or 3 unknowns a node a mesh of `N`
+//! cells has `O(N log N)` entries in the factor and takes `O(N^1.5)` operations.
+//!
+//! **Only what changed is factored again.** A front whose cells all handed in the same matrix, bit
+//! for bit, as before keeps its part of the factor and its update; those above cells that changed
+//! are redone, with the same operations in the same order as if all were: the factor does not
+//! depend on what was kept. Updates of rectangles below [`Multifrontal::kept_side`] cells are not
+//! kept: there a rectangle is redone whole, in memory that stays in the cache.
+//!
+//! **Threads** take subtrees of their own. Sums have one order, so that no bit of the result depends
+//! on their number.
+
+mod front;
+mod kernels;
+pub mod tree;
+
+use super::element::{CellBlocks, pair};
+use crate::threads;
+use front::{Matrix, Size};
+use kernels::{Columns, Simd};
+use std::ops::Range;
+use std::sync::Arc;
+use tree::{Run, Source, Tree};
+
+/// Sides, in cells, of the largest rectangles that are redone whole.
+const KEPT_SIDE: u32 = 8;
+
+/// Subtrees are shared out among threads down to this depth.
+const SHARED_DEPTH: u32 = 4;
+
+/// Fewer fronts than this are not worth another thread.
+const SHARED_FRONTS: u32 = 64;
+
+/// Memory for updates that are kept, in bytes; beyond it larger rectangles are redone whole.
+const KEPT_BYTES: usize = 6 << 30;
+
+/// The matrix is not positive definite.
+#[derive(Debug, thiserror::Error)]
+#[error("the matrix is not positive definite at skeleton unknown {unknown}")]
+pub struct NotPositiveDefinite {
+    pub unknown: usize,
+}
+
+/// A factored matrix on the skeleton, with `D` unknowns per node.
+pub struct Multifrontal<const D: usize> {
+    tree: Arc<Tree>,
+    places: Places,
+    simd: Simd,
+    /// Panels of all fronts in postorder.
+    factor: Vec<f64>,
+    /// Updates that are kept.
+    updates: Vec<f64>,
+    /// Of each front: own and rim unknowns of the vector being solved for.
+    vectors: Vec<f64>,
+    /// Updates that are not kept, per task.
+    work: Vec<Vec<f64>>,
+    /// Whether the front is to be factored again.
+    stale: Vec<bool>,
+    /// The front that each cell belongs to.
+    leaf_of: Vec<u32>,
+}
+
+/// Where the fronts' data are: each list has one entry more than there are fronts.
+struct Places {
+    panel: Vec<usize>,
+    /// Of no length where updates are not kept.
+    update: Vec<usize>,
+    vector: Vec<usize>,
+    /// Whether the front and all below are redone together.
+    whole: Vec<bool>,
+    kept_side: u32,
+}
+
+fn size<const D: usize>(tree: &Tree, f: usize) -> Size {
+    let front = &tree.fronts[f];
+    Size { own: D * front.own as usize, rim: D * front.rim.len() }
+}
+
+impl Places {
+    fn new<const D: usize>(tree: &Tree) -> Self {
+        let kept = |side: u32| -> usize {
+            (0..tree.fronts.len())
+                .filter(|&f| is_kept(tree, f, side))
+                .map(|f| size::<D>(tree, f).update())
+                .sum()
+        };
+        let mut side = KEPT_SIDE;
+        while kept(side) * size_of::<f64>() > KEPT_BYTES
+            && side < tree.fronts.iter().map(|f| f.side).max().unwrap_or(0)
+        {
+            side *= 2;
+        }
+        let offsets = |len: &dyn Fn(usize) -> usize| -> Vec<usize> {
+            let mut at = vec![0];
+            let mut sum = 0;
+            for f in 0..tree.fronts.len() {
+                sum += len(f);
+                at.push(sum);
+            }
+            at
+        };
+        Places {
+            panel: offsets(&|f| size::<D>(tree, f).panel()),
+            update: offsets(&|f| {
+                if is_kept(tree, f, side) { size::<D>(tree, f).update() } else { 0 }
+            }),
+            vector: offsets(&|f| size::<D>(tree, f).rows()),
+            whole: tree.fronts.iter().map(|f| f.side <= side).collect(),
+            kept_side: side,
+        }
+    }
+}
+
+/// Updates are kept of the largest rectangles that are redone whole, and of all above.
+fn is_kept(tree: &Tree, f: usize, side: u32) -> bool {
+    tree.fronts[f].side > side || tree.parent[f].is_none_or(|p| tree.fronts[p].side > side)
+}
+
+/// The data of some consecutive fronts, from front `first` on.
+struct Part<'a> {
+    places: &'a Places,
+    first: usize,
+    factor: &'a mut [f64],
+    updates: &'a mut [f64],
+}
+
+impl Part<'_> {
+    fn reborrow(&mut self) -> Part<'_> {
+        let Part { places, first, factor, updates } = self;
+        Part { places, first: *first, factor, updates }
+    }
+
+    /// The fronts before `front`, and those from it on.
+    fn split(&mut self, front: usize) -> [Part<'_>; 2] {
+        let Part { places, first, factor, updates } = self.reborrow();
+        let (f0, f1) = factor.split_at_mut(places.panel[front] - places.panel[first]);
+        let (u0, u1) = updates.split_at_mut(places.update[front] - places.update[first]);
+        [
+            Part { places, first, factor: f0, updates: u0 },
+            Part { places, first: front, factor: f1, updates: u1 },
+        ]
+    }
+}
+
+impl<const D: usize> Multifrontal<D> {
+    pub fn new(tree: Arc<Tree>, cells: usize) -> Self {
+        let places = Places::new::<D>(&tree);
+        let fronts = tree.fronts.len();
+        let mut leaf_of = vec![0; cells];
+        for (f, front) in tree.fronts.iter().enumerate() {
+            if let Source::Cells(list) = &front.source {
+                list.iter().for_each(|c| leaf_of[c.cell as usize] = f as u32);
+            }
+        }
+        let workspace = (0..fronts)
+            .filter(|&f| places.whole[f])
+            .map(|f| workspace::<D>(&tree, f))
+            .max()
+            .unwrap_or(0);
+        Multifrontal {
+            factor: vec![0.0; places.panel[fronts]],
+            updates: vec![0.0; places.update[fronts]],
+            vectors: vec![0.0; places.vector[fronts]],
+            work: vec![vec![0.0; workspace]; 1 << SHARED_DEPTH],
+            stale: vec![true; fronts],
+            simd: Simd::detect(),
+            leaf_of,
+            places,
+            tree,
+        }
+    }
+
+    pub fn tree(&self) -> &Arc<Tree> {
+        &self.tree
+    }
+    pub fn unknowns(&self) -> usize {
+        D * self.tree.len()
+    }
+    /// Entries of the factor, and of updates that are kept.
+    pub fn entries(&self) -> [usize; 2] {
+        [self.factor.len(), self.updates.len()]
+    }
+    /// Sides, in cells, of the largest rectangles that are redone whole.
+    pub fn kept_side(&self) -> u32 {
+        self.places.kept_side
+    }
+
+    /// Says that a cell's matrix is not what it was at the last factorisation.
+    pub fn touch(&mut self, cell: usize) {
+        self.stale[self.leaf_of[cell] as usize] = true;
+    }
+
+    /// Factors again what lies above cells that changed; the share of the factor's entries that
+    /// was computed.
+    pub fn factorize(&mut self, cells: &[CellBlocks<D>]) -> Result<f64, NotPositiveDefinite> {
+        self.spread_stale();
+        let Multifrontal { tree, places, simd, factor, updates, work, stale, .. } = self;
+        let redone = (0..tree.fronts.len()).filter(|&f| stale[f]);
+        let redone: usize = redone.map(|f| places.panel[f + 1] - places.panel[f]).sum();
+        let share = redone as f64 / factor.len().max(1) as f64;
+        let stage = Factorize { tree, stale, simd: *simd, cells };
+        if let Some(root) = tree.fronts.len().checked_sub(1) {
+            stage.kept(root, Part { places, first: 0, factor, updates }, work)?;
+        }
+        // A factorisation that fails leaves all of them stale.
+        self.stale.fill(false);
+        Ok(share)
+    }
+
+    /// What lies above stale fronts is stale; rectangles that are redone whole are so all of them.
+    fn spread_stale(&mut self) {
+        for f in 0..self.stale.len() {
+            if self.stale[f]
+                && let Some(parent) = self.tree.parent[f]
+            {
+                self.stale[parent] = true;
+            }
+        }
+        for f in (0..self.stale.len()).rev() {
+            if let Some(parent) = self.tree.parent[f]
+                && self.places.whole[parent]
+            {
+                self.stale[f] = self.stale[parent];
+            }
+        }
+    }
+
+    /// Solves with the factor; `x` in the elimination order.
+    pub fn solve(&mut self, x: &mut [f64]) {
+        let Multifrontal { tree, places, simd, factor, vectors, .. } = self;
+        let sweep = Sweep::<D> { tree, places, simd: *simd, factor };
+        if let Some(root) = tree.fronts.len().checked_sub(1) {
+            sweep.forward(root, Unknowns { x, vectors }, SHARED_DEPTH);
+            sweep.backward(root, Unknowns { x, vectors }, None, SHARED_DEPTH);
+        }
+    }
+}
+
+/// Entries that the updates below a front take while it is redone.
+fn workspace<const D: usize>(tree: &Tree, f: usize) -> usize {
+    match tree.fronts[f].source {
+        Source::Cells(_) => 0,
+        Source::Children(_) => {
+            let children = tree.children(f);
+            let updates: usize = children.iter().map(|&c| size::<D>(tree, c).update()).sum();
+            let below = children.iter().map(|&c| workspace::<D>(tree, c)).max();
+            updates + below.unwrap_or(0)
+        }
+    }
+}
+
+/// One factorisation.
+struct Factorize<'a, const D: usize> {
+    tree: &'a Tree,
+    stale: &'a [bool],
+    simd: Simd,
+    cells: &'a [CellBlocks<D>],
+}
+
+impl<const D: usize> Factorize<'_, D> {
+    /// A subtree whose update is kept; `part` holds just this subtree.
+    fn kept(
+        &self,
+        f: usize,
+        mut part: Part,
+        work: &mut [Vec<f64>],
+    ) -> Result<(), NotPositiveDefinite> {
+        if !self.stale[f] {
+            return Ok(());
+        }
+        let [mut below, here] = part.split(f);
+        let runs = match &self.tree.fronts[f].source {
+            Source::Children(runs) if !here.places.whole[f] => runs,
+            _ => return self.whole(f, below, here.factor, here.updates, &mut work[0]),
+        };
+        let [left, right] = self.tree.children(f);
+        let [mut a, mut b] = below.split(left + 1);
+        let shared = work.len() > 1 && self.tree.fronts[f].subtree > SHARED_FRONTS;
+        let (first, second) = if shared {
+            let (w0, w1) = work.split_at_mut(work.len() / 2);
+            threads::both(
+                true,
+                || self.kept(left, a.reborrow(), w0),
+                || self.kept(right, b.reborrow(), w1),
+            )
+        } else {
+            (self.kept(left, a.reborrow(), work), self.kept(right, b.reborrow(), work))
+        };
+        first.and(second)?;
+        let updates = [(left, &a), (right, &b)].map(|(child, part)| {
+            let update = size::<D>(self.tree, child).update();
+            &part.updates[part.updates.len() - update..]
+        });
+        let size = size::<D>(self.tree, f);
+        let mut matrix = Matrix { size, panel: here.factor, update: here.updates };
+        self.assemble(&mut matrix, [left, right], updates, runs);
+        self.eliminate(f, matrix)
+    }
+
+    /// A subtree that is redone whole, with all updates below it in `work`.
+    fn whole(
+        &self,
+        f: usize,
+        mut below: Part,
+        panel: &mut [f64],
+        update: &mut [f64],
+        work: &mut [f64],
+    ) -> Result<(), NotPositiveDefinite> {
+        let mut matrix = Matrix { size: size::<D>(self.tree, f), panel, update };
+        match &self.tree.fronts[f].source {
+            Source::Cells(cells) => {
+                matrix.clear();
+                for c in cells {
+                    add_cell(&mut matrix, &c.nodes, &self.cells[c.cell as usize]);
+                }
+            }
+            Source::Children(runs) => {
+                let children = self.tree.children(f);
+                let [left, right] = children.map(|c| size::<D>(self.tree, c).update());
+                let (left, rest) = work.split_at_mut(left);
+                let (right, rest) = rest.split_at_mut(right);
+                let parts = below.split(children[0] + 1);
+                for ((child, mut part), update) in
+                    children.into_iter().zip(parts).zip([&mut *left, &mut *right])
+                {
+                    let [below, here] = part.split(child);
+                    self.whole(child, below, here.factor, update, rest)?;
+                }
+                self.assemble(&mut matrix, children, [left, right], runs);
+            }
+        }
+        self.eliminate(f, matrix)
+    }
+
+    /// A front from its children's updates.
+    fn assemble(
+        &self,
+        matrix: &mut Matrix,
+        children: [usize; 2],
+        updates: [&[f64]; 2],
+        runs: &[Vec<Run>; 2],
+    ) {
+        matrix.clear();
+        for ((child, update), runs) in children.into_iter().zip(updates).zip(runs) {
+            matrix.add_update::<D>(size::<D>(self.tree, child).rim, update, runs);
+        }
+    }
+
+    fn eliminate(&self, f: usize, mut matrix: Matrix) -> Result<(), NotPositiveDefinite> {
+        let first = D * self.tree.fronts[f].first as usize;
+        matrix.eliminate(self.simd).map_err(|i| NotPositiveDefinite { unknown: first + i })
+    }
+}
+
+fn add_cell<const D: usize>(matrix: &mut Matrix, nodes: &[u16; 8], blocks: &CellBlocks<D>) {
+    for k in 0..8 {
+        for l in 0..=k {
+            let block = &blocks[pair(k, l)];
+            let at = [nodes[k], nodes[l]].map(usize::from);
+            matrix.add_block([at[0].max(at[1]), at[0].min(at[1])], block, at[0] < at[1]);
+            if k != l && at[0] == at[1] {
+                // A periodic cell that is its own neighbour: both blocks are on the diagonal.
+                matrix.add_block(at, block, true);
+            }
+        }
+    }
+}
+
+/// One solution.
+struct Sweep<'a, const D: usize> {
+    tree: &'a Tree,
+    places: &'a Places,
+    simd: Simd,
+    factor: &'a [f64],
+}
+
+/// Unknowns of a subtree: those that it eliminates, and the vectors of its fronts.
+struct Unknowns<'a> {
+    x: &'a mut [f64],
+    vectors: &'a mut [f64],
+}
+
+impl<const D: usize> Sweep<'_, D> {
+    fn columns(&self, f: usize) -> Columns<'_> {
+        let data = &self.factor[self.places.panel[f]..self.places.panel[f + 1]];
+        Columns { data, ld: size::<D>(self.tree, f).rows() }
+    }
+
+    fn is_shared(&self, f: usize, depth: u32) -> bool {
+        depth > 0 && self.tree.fronts[f].subtree > SHARED_FRONTS
+    }
+
+    /// The two children's parts of a subtree, and the front's own.
+    fn split<'a>(&self, f: usize, u: Unknowns<'a>) -> [Unknowns<'a>; 3] {
+        let [left, right] = self.tree.children(f);
+        let (first, vector) = (self.tree.first_of(f), &self.places.vector);
+        let start = |front: usize| D * self.tree.fronts[front].first as usize;
+        let (x0, x1, x2) = (start(first), start(self.tree.first_of(right)), start(f));
+        let (xl, x) = u.x.split_at_mut(x1 - x0);
+        let (xr, x) = x.split_at_mut(x2 - x1);
+        let (vl, v) = u.vectors.split_at_mut(vector[left + 1] - vector[first]);
+        let (vr, v) = v.split_at_mut(vector[f] - vector[left + 1]);
+        [(xl, vl), (xr, vr), (x, v)].map(|(x, vectors)| Unknowns { x, vectors })
+    }
+
+    /// Forward substitution in a subtree. Each front's vector then holds its own unknowns so far
+    /// and what they add to the right-hand side on its rim.
+    fn forward(&self, f: usize, u: Unknowns, depth: u32) {
+        let size = size::<D>(self.tree, f);
+        let vector = match &self.tree.fronts[f].source {
+            Source::Cells(_) => {
+                begin(size, u.x, u.vectors);
+                u.vectors
+            }
+            Source::Children(runs) => {
+                let [mut left, mut right, here] = self.split(f, u);
+                let [l, r] = self.tree.children(f);
+                threads::both(
+                    self.is_shared(f, depth),
+                    || self.forward(l, left.reborrow(), depth.saturating_sub(1)),
+                    || self.forward(r, right.reborrow(), depth.saturating_sub(1)),
+                );
+                begin(size, here.x, here.vectors);
+                for (child, part, runs) in [(l, &left, &runs[0]), (r, &right, &runs[1])] {
+                    let rim = D * self.tree.fronts[child].rim.len();
+                    let rim = &part.vectors[part.vectors.len() - rim..];
+                    for (to, from) in runs.iter().map(ends::<D>) {
+                        for (t, f) in here.vectors[to].iter_mut().zip(&rim[from]) {
+                            *t += f;
+                        }
+                    }
+                }
+                here.vectors
+            }
+        };
+        let (own, rim) = vector.split_at_mut(size.own);
+        kernels::forward(self.simd, self.columns(f), own, rim);
+    }
+
+    /// Backward substitution in a subtree, whose rim is known from the parent's vector. Each
+    /// front's vector then holds the solution.
+    fn backward(&self, f: usize, u: Unknowns, parent: Option<(&[f64], &[Run])>, depth: u32) {
+        let size = size::<D>(self.tree, f);
+        let (children, here) = match &self.tree.fronts[f].source {
+            Source::Cells(_) => (None, u),
+            Source::Children(runs) => {
+                let [left, right, here] = self.split(f, u);
+                (Some((left, right, runs)), here)
+            }
+        };
+        let (own, rim) = here.vectors.split_at_mut(size.own);
+        if let Some((known, runs)) = parent {
+            for (from, to) in runs.iter().map(ends::<D>) {
+                rim[to].copy_from_slice(&known[from]);
+            }
+        }
+        kernels::backward(self.simd, self.columns(f), own, rim);
+        here.x.copy_from_slice(own);
+        if let Some((left, right, runs)) = children {
+            let [l, r] = self.tree.children(f);
+            let known = &*here.vectors;
+            threads::both(
+                self.is_shared(f, depth),
+                || self.backward(l, left, Some((known, &runs[0])), depth.saturating_sub(1)),
+                || self.backward(r, right, Some((known, &runs[1])), depth.saturating_sub(1)),
+            );
+        }
+    }
+}
+
+impl Unknowns<'_> {
+    fn reborrow(&mut self) -> Unknowns<'_> {
+        Unknowns { x: self.x, vectors: self.vectors }
+    }
+}
+
+/// A front's vector before anything is added to it.
+fn begin(size: Size, x: &[f64], vector: &mut [f64]) {
+    vector[..size.own].copy_from_slice(x);
+    vector[size.own..].fill(0.0);
+}
+
+/// Unknowns of the parent, and of the child's rim, that a run joins.
+fn ends<const D: usize>(run: &Run) -> (Range<usize>, Range<usize>) {
+    let range = |start: u32| D * start as usize..D * (start + run.len) as usize;
+    (range(run.parent), range(run.child))
+}
