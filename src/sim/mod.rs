@@ -26,6 +26,7 @@ use crate::plan::boundary::add_body_force;
 use crate::plan::{Matter, Plan, Warning, When};
 use crate::scene::{Integrator, Quadrature as Rule};
 use crate::solve::buoyancy::{Ahead, Restoring};
+use crate::solve::multifrontal::Effort;
 use crate::solve::quadrature::{EmptyCell, Quadrature};
 use crate::solve::stokes::{Loads, Report, SolveError, Stokes, Stopping};
 use crate::solve::weight::Weight;
@@ -143,6 +144,10 @@ pub trait Run: Send {
     fn state_hash(&self) -> String;
     /// Unknowns of the solver: velocity and rotation, pressure.
     fn unknowns(&self) -> [usize; 2];
+    /// What the last factorisation took.
+    fn factor_effort(&self) -> Effort;
+    /// Lets the next factorisation compute all of the factor, changed or not: for measurements.
+    fn forget_factor(&mut self);
     fn count(&self) -> Count;
     /// Warnings that arose while running.
     fn warnings(&self) -> Vec<Warning>;
@@ -554,6 +559,12 @@ impl<const D: usize> Run for Simulation<D> {
     }
     fn unknowns(&self) -> [usize; 2] {
         [self.stokes.unknowns(), 3 * self.plan.mesh.cells()]
+    }
+    fn factor_effort(&self) -> Effort {
+        self.stokes.effort()
+    }
+    fn forget_factor(&mut self) {
+        self.stokes.forget_factor();
     }
     fn count(&self) -> Count {
         self.count

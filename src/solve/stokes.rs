@@ -29,7 +29,7 @@ use super::buoyancy::{Restoring, SIDE_NODES};
 use super::element::{Divergence, Internal, Nodal, SKELETON_NODES, pressure_mass};
 use super::matrices::{Ingredients, Matrices};
 use super::multifrontal::tree::{NO_POSITION, Tree};
-use super::multifrontal::{Multifrontal, NotPositiveDefinite};
+use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
 use super::quadrature::Quadrature;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
@@ -275,6 +275,16 @@ impl<const D: usize> Stokes<D> {
     pub fn unknowns(&self) -> usize {
         self.mesh.nodes() * D
     }
+    /// What the last factorisation took.
+    pub fn effort(&self) -> Effort {
+        self.factor.effort()
+    }
+
+    /// Lets the next factorisation compute all of the factor, changed or not: for measurements.
+    pub fn forget_factor(&mut self) {
+        self.factor.forget();
+    }
+
     /// Solves for `flow`, starting from what it holds.
     pub fn solve(
         &mut self,

@@ -31,6 +31,11 @@ impl Size {
     pub fn panel(self) -> usize {
         self.own * self.rows()
     }
+    /// Additions and multiplications of the elimination.
+    pub fn flops(self) -> f64 {
+        let (p, b) = (self.own as f64, self.rim as f64);
+        p * p * p / 3.0 + p * p * b + p * b * b
+    }
     /// Entries of the stored update.
     pub fn update(self) -> usize {
         update_len(self.rim)

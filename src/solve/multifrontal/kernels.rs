@@ -486,3 +486,118 @@ fn subtract_products<const W: usize, const FMA: bool>(a: Columns, y: &[f64], x: 
         x[k] += s;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sets() -> Vec<Simd> {
+        let best = Simd::detect();
+        #[cfg(target_arch = "x86_64")]
+        if best == Simd::Avx512 {
+            return vec![Simd::Portable, Simd::Avx2, best];
+        }
+        if best == Simd::Portable { vec![best] } else { vec![Simd::Portable, best] }
+    }
+
+    fn numbers(n: usize) -> Vec<f64> {
+        (0..n).map(|k| ((k * k) as f64 * 0.37 + 1.0).sin()).collect()
+    }
+
+    /// Every instruction set does what plain loops do.
+    #[test]
+    fn products_are_those_of_plain_loops() {
+        for simd in sets() {
+            for (rows, columns, depth) in [(1, 1, 1), (7, 3, 2), (42, 32, 10), (130, 17, 64)] {
+                let (ld_a, ld_c) = (rows + 3, rows + 1);
+                let a = numbers(ld_a * depth);
+                let before = numbers(ld_c * columns);
+                let mut c = before.clone();
+                let size = Product { rows, columns, depth };
+                let to = ColumnsMut { data: &mut c, ld: ld_c };
+                subtract_square(simd, to, Columns { data: &a, ld: ld_a }, size);
+                for j in 0..columns {
+                    for i in j..rows {
+                        let sum: f64 = (0..depth).map(|k| a[i + k * ld_a] * a[j + k * ld_a]).sum();
+                        let expected = before[i + j * ld_c] - sum;
+                        let got = c[i + j * ld_c];
+                        assert!((got - expected).abs() < 1e-12, "{simd:?} {i} {j}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// `L1 L1'` and `L2 L1'` give the matrix back, and both substitutions invert it.
+    #[test]
+    fn panels_and_substitutions_invert() {
+        for simd in sets() {
+            for (own, rim) in [(1, 0), (2, 5), (8, 8), (10, 32), (21, 13)] {
+                let rows = own + rim;
+                let mut a = vec![0.0; rows * own];
+                let noise = numbers(rows * own);
+                for j in 0..own {
+                    for i in j..rows {
+                        a[i + j * rows] =
+                            if i == j { rows as f64 } else { 0.5 * noise[i + j * rows] };
+                    }
+                }
+                let mut l = a.clone();
+                let mut at = 0;
+                while at < own {
+                    let columns = PANEL.min(own - at);
+                    let (before, here) = l.split_at_mut(at * rows);
+                    if at > 0 {
+                        let size = Product { rows: rows - at, columns, depth: at };
+                        let c = ColumnsMut { data: &mut here[at..], ld: rows };
+                        let known = Columns { data: &before[at..], ld: rows };
+                        subtract_square(simd, c, known, size);
+                    }
+                    let c = ColumnsMut { data: &mut here[at..], ld: rows };
+                    factor_panel(simd, c, rows - at, columns).unwrap();
+                    at += columns;
+                }
+                let entry = |i: usize, j: usize| match i.cmp(&j) {
+                    std::cmp::Ordering::Less => 0.0,
+                    std::cmp::Ordering::Equal => 1.0 / l[i + j * rows],
+                    std::cmp::Ordering::Greater => l[i + j * rows],
+                };
+                for j in 0..own {
+                    for i in j..rows {
+                        let product: f64 = (0..=j).map(|k| entry(i, k) * entry(j, k)).sum();
+                        assert!((product - a[i + j * rows]).abs() < 1e-12 * rows as f64);
+                    }
+                }
+                // L [x; rest'] = [b; rest]: forward gives x, and rest loses L2 x.
+                let (b, rest) = (numbers(own), numbers(rim));
+                let (mut x, mut left) = (b.clone(), rest.clone());
+                let columns = Columns { data: &l, ld: rows };
+                forward(simd, columns, &mut x, &mut left);
+                for i in 0..rows {
+                    let product: f64 = (0..own).map(|k| entry(i, k) * x[k]).sum();
+                    let expected = if i < own { b[i] } else { rest[i - own] - left[i - own] };
+                    assert!((product - expected).abs() < 1e-12, "{simd:?} {i}");
+                }
+                let mut y = b.clone();
+                backward(simd, columns, &mut y, &rest);
+                for j in 0..own {
+                    let known = y.iter().chain(&rest).enumerate().skip(j);
+                    let product: f64 = known.map(|(i, v)| entry(i, j) * v).sum();
+                    assert!((product - b[j]).abs() < 1e-11, "{simd:?} {j}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pivots_that_are_not_positive_are_named_and_idle_ones_pass() {
+        for simd in sets() {
+            let mut a = vec![0.0; 16];
+            (a[0], a[5], a[10], a[15]) = (4.0, 0.0, -1.0, 1.0);
+            let c = ColumnsMut { data: &mut a, ld: 4 };
+            assert_eq!(factor_panel(simd, c, 4, 4), Err(2));
+            let mut a = vec![f64::NAN];
+            assert_eq!(factor_panel(simd, ColumnsMut { data: &mut a, ld: 1 }, 1, 1), Err(0));
+        }
+    }
+}

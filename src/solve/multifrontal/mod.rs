@@ -8,7 +8,7 @@
 //! **Only what changed is factored again.** A front whose cells all handed in the same matrix, bit
 //! for bit, as before keeps its part of the factor and its update; those above cells that changed
 //! are redone, with the same operations in the same order as if all were: the factor does not
-//! depend on what was kept. Updates of rectangles below [`Multifrontal::kept_side`] cells are not
+//! depend on what was kept. Updates of rectangles below [`KEPT_SIDE`] cells are not
 //! kept: there a rectangle is redone whole, in memory that stays in the cache.
 //!
 //! **Threads** take subtrees of their own. Sums have one order, so that no bit of the result depends
@@ -45,6 +45,19 @@ pub struct NotPositiveDefinite {
     pub unknown: usize,
 }
 
+/// What a factorisation took, beside what one of all fronts would.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Effort {
+    /// Entries of the factor that were computed.
+    pub entries: usize,
+    /// Additions and multiplications.
+    pub flops: f64,
+    pub all_entries: usize,
+    pub all_flops: f64,
+    /// Entries of updates that are kept.
+    pub kept_entries: usize,
+}
+
 /// A factored matrix on the skeleton, with `D` unknowns per node.
 pub struct Multifrontal<const D: usize> {
     tree: Arc<Tree>,
@@ -62,6 +75,7 @@ pub struct Multifrontal<const D: usize> {
     stale: Vec<bool>,
     /// The front that each cell belongs to.
     leaf_of: Vec<u32>,
+    effort: Effort,
 }
 
 /// Where the fronts' data are: each list has one entry more than there are fronts.
@@ -72,7 +86,6 @@ struct Places {
     vector: Vec<usize>,
     /// Whether the front and all below are redone together.
     whole: Vec<bool>,
-    kept_side: u32,
 }
 
 fn size<const D: usize>(tree: &Tree, f: usize) -> Size {
@@ -110,7 +123,6 @@ impl Places {
             }),
             vector: offsets(&|f| size::<D>(tree, f).rows()),
             whole: tree.fronts.iter().map(|f| f.side <= side).collect(),
-            kept_side: side,
         }
     }
 }
@@ -168,6 +180,7 @@ impl<const D: usize> Multifrontal<D> {
             work: vec![vec![0.0; workspace]; 1 << SHARED_DEPTH],
             stale: vec![true; fronts],
             simd: Simd::detect(),
+            effort: Effort::default(),
             leaf_of,
             places,
             tree,
@@ -180,13 +193,14 @@ impl<const D: usize> Multifrontal<D> {
     pub fn unknowns(&self) -> usize {
         D * self.tree.len()
     }
-    /// Entries of the factor, and of updates that are kept.
-    pub fn entries(&self) -> [usize; 2] {
-        [self.factor.len(), self.updates.len()]
+    /// Of the last factorisation.
+    pub fn effort(&self) -> Effort {
+        self.effort
     }
-    /// Sides, in cells, of the largest rectangles that are redone whole.
-    pub fn kept_side(&self) -> u32 {
-        self.places.kept_side
+
+    /// Lets the next factorisation compute all fronts.
+    pub fn forget(&mut self) {
+        self.stale.fill(true);
     }
 
     /// Says that a cell's matrix is not what it was at the last factorisation.
@@ -194,21 +208,32 @@ impl<const D: usize> Multifrontal<D> {
         self.stale[self.leaf_of[cell] as usize] = true;
     }
 
-    /// Factors again what lies above cells that changed; the share of the factor's entries that
-    /// was computed.
-    pub fn factorize(&mut self, cells: &[CellBlocks<D>]) -> Result<f64, NotPositiveDefinite> {
+    /// Factors again what lies above cells that changed. After a failure all fronts above those that
+    /// failed remain to be factored.
+    pub fn factorize(&mut self, cells: &[CellBlocks<D>]) -> Result<(), NotPositiveDefinite> {
         self.spread_stale();
+        self.effort = self.effort_ahead();
         let Multifrontal { tree, places, simd, factor, updates, work, stale, .. } = self;
-        let redone = (0..tree.fronts.len()).filter(|&f| stale[f]);
-        let redone: usize = redone.map(|f| places.panel[f + 1] - places.panel[f]).sum();
-        let share = redone as f64 / factor.len().max(1) as f64;
         let stage = Factorize { tree, stale, simd: *simd, cells };
         if let Some(root) = tree.fronts.len().checked_sub(1) {
             stage.kept(root, Part { places, first: 0, factor, updates }, work)?;
         }
-        // A factorisation that fails leaves all of them stale.
         self.stale.fill(false);
-        Ok(share)
+        Ok(())
+    }
+
+    fn effort_ahead(&self) -> Effort {
+        let mut out = Effort { kept_entries: self.updates.len(), ..Effort::default() };
+        for (f, &stale) in self.stale.iter().enumerate() {
+            let size = size::<D>(&self.tree, f);
+            out.all_entries += size.panel();
+            out.all_flops += size.flops();
+            if stale {
+                out.entries += size.panel();
+                out.flops += size.flops();
+            }
+        }
+        out
     }
 
     /// What lies above stale fronts is stale; rectangles that are redone whole are so all of them.
@@ -488,4 +513,175 @@ fn begin(size: Size, x: &[f64], vector: &mut [f64]) {
 fn ends<const D: usize>(run: &Run) -> (Range<usize>, Range<usize>) {
     let range = |start: u32| D * start as usize..D * (start + run.len) as usize;
     (range(run.parent), range(run.child))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::element::SKELETON_NODES;
+    use super::*;
+    use crate::space::mesh::{Axis, Mesh};
+    use rand::{Rng, SeedableRng};
+
+    fn mesh(n: [usize; 2], periodic: [bool; 2]) -> Mesh {
+        let axis = |n: usize, periodic| Axis::new((0..=n).map(|i| i as f64).collect(), periodic);
+        let mut mesh = Mesh::new(axis(n[0], periodic[0]), axis(n[1], periodic[1]));
+        // A block of solid cells in a corner.
+        (0..mesh.cells() / 9).for_each(|c| mesh.solid[c] = true);
+        mesh
+    }
+
+    /// `G G' + I` of a random `G`, cell by cell.
+    fn matrices<const D: usize>(mesh: &Mesh, seed: u64) -> Vec<CellBlocks<D>> {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+        let n = 8 * D;
+        let mut one = || {
+            let g: Vec<f64> = (0..n * n).map(|_| rng.random_range(-0.5..0.5)).collect();
+            let mut out = [[[0.0; D]; D]; 36];
+            for k in 0..8 {
+                for l in 0..=k {
+                    for r in 0..D {
+                        for c in 0..D {
+                            let (i, j) = (D * k + r, D * l + c);
+                            out[pair(k, l)][r][c] = f64::from(i == j)
+                                + (0..n).map(|m| g[i * n + m] * g[j * n + m]).sum::<f64>();
+                        }
+                    }
+                }
+            }
+            out
+        };
+        (0..mesh.cells()).map(|_| one()).collect()
+    }
+
+    fn times<const D: usize>(
+        mesh: &Mesh,
+        tree: &Tree,
+        cells: &[CellBlocks<D>],
+        x: &[f64],
+    ) -> Vec<f64> {
+        let mut out = vec![0.0; x.len()];
+        for (cell, blocks) in cells.iter().enumerate().filter(|&(c, _)| !mesh.solid[c]) {
+            let nodes = mesh.cell_nodes(cell);
+            let at = SKELETON_NODES.map(|a| D * tree.position[nodes[a]] as usize);
+            for k in 0..8 {
+                for l in 0..=k {
+                    for r in 0..D {
+                        for c in 0..D {
+                            let (i, j, v) = (at[k] + r, at[l] + c, blocks[pair(k, l)][r][c]);
+                            out[i] += v * x[j];
+                            if k != l {
+                                out[j] += v * x[i];
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    fn shapes() -> [Mesh; 5] {
+        [
+            mesh([1, 1], [false; 2]),
+            mesh([7, 5], [false; 2]),
+            mesh([30, 19], [false; 2]),
+            mesh([12, 21], [true, false]),
+            mesh([18, 20], [true; 2]),
+        ]
+    }
+
+    fn solutions_satisfy_their_equations<const D: usize>() {
+        for mesh in shapes() {
+            let tree = Arc::new(Tree::new(&mesh));
+            let cells = matrices::<D>(&mesh, 3);
+            let mut factor = Multifrontal::<D>::new(tree.clone(), mesh.cells());
+            factor.factorize(&cells).unwrap();
+            let x: Vec<f64> = (0..factor.unknowns()).map(|k| (k as f64).sin()).collect();
+            let mut y = times(&mesh, &tree, &cells, &x);
+            factor.solve(&mut y);
+            assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn solutions_satisfy_the_equations() {
+        solutions_satisfy_their_equations::<2>();
+        solutions_satisfy_their_equations::<3>();
+    }
+
+    #[test]
+    fn a_factor_of_what_changed_is_the_factor_of_all_to_the_bit() {
+        for mesh in shapes() {
+            let tree = Arc::new(Tree::new(&mesh));
+            let (mut cells, other) = (matrices::<2>(&mesh, 5), matrices::<2>(&mesh, 6));
+            let mut kept = Multifrontal::<2>::new(tree.clone(), mesh.cells());
+            kept.factorize(&cells).unwrap();
+            for round in 0..3 {
+                for cell in (0..mesh.cells()).filter(|c| c % 97 == 13 * round % 97) {
+                    cells[cell] = other[cell];
+                    kept.touch(cell);
+                }
+                kept.factorize(&cells).unwrap();
+                let mut fresh = Multifrontal::<2>::new(tree.clone(), mesh.cells());
+                fresh.factorize(&cells).unwrap();
+                assert_eq!(kept.factor, fresh.factor);
+                assert!(mesh.cells() < 100 || kept.effort().entries < fresh.effort().entries);
+            }
+        }
+    }
+
+    #[test]
+    fn no_bit_depends_on_the_number_of_threads() {
+        let mesh = mesh([60, 45], [false; 2]);
+        let tree = Arc::new(Tree::new(&mesh));
+        let cells = matrices::<3>(&mesh, 8);
+        let run = || {
+            let mut factor = Multifrontal::<3>::new(tree.clone(), mesh.cells());
+            factor.factorize(&cells).unwrap();
+            let mut x: Vec<f64> = (0..factor.unknowns()).map(|k| (k as f64).cos()).collect();
+            factor.solve(&mut x);
+            (factor.factor, x)
+        };
+        let one = threads::alone(run);
+        for threads in [2, 4] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(pool.install(run) == one, "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_definite_is_refused_until_it_is_mended() {
+        let mesh = mesh([20, 20], [false; 2]);
+        let tree = Arc::new(Tree::new(&mesh));
+        let mut cells = matrices::<2>(&mesh, 9);
+        let good = cells[210];
+        cells[210].iter_mut().flatten().flatten().for_each(|v| *v *= -9.0);
+        let mut factor = Multifrontal::<2>::new(tree.clone(), mesh.cells());
+        let error = factor.factorize(&cells).unwrap_err();
+        let node = tree.node[error.unknown / 2] as usize;
+        let [x, y] = mesh.node_position(node);
+        assert!((x - 10.5).abs() < 3.0 && (y - 10.5).abs() < 3.0, "{x} {y}");
+        cells[210] = good;
+        factor.factorize(&cells).unwrap();
+        let mut fresh = Multifrontal::<2>::new(tree, mesh.cells());
+        fresh.factorize(&cells).unwrap();
+        assert_eq!(factor.factor, fresh.factor);
+    }
+
+    #[test]
+    fn work_and_memory_grow_as_nested_dissection_says() {
+        let effort = |n: usize| {
+            let mesh = Mesh::new(
+                Axis::new((0..=n).map(|i| i as f64).collect(), false),
+                Axis::new((0..=n).map(|i| i as f64).collect(), false),
+            );
+            let factor = Multifrontal::<2>::new(Arc::new(Tree::new(&mesh)), mesh.cells());
+            factor.effort_ahead()
+        };
+        let (coarse, fine) = (effort(64), effort(256));
+        let exponent = |a: f64, b: f64| (b / a).ln() / 16f64.ln();
+        assert!(exponent(coarse.all_flops, fine.all_flops) < 1.5);
+        assert!(exponent(coarse.all_entries as f64, fine.all_entries as f64) < 1.15);
+        assert!(exponent(coarse.kept_entries as f64, fine.kept_entries as f64) < 1.2);
+    }
 }
