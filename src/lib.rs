@@ -48,6 +48,7 @@ pub mod sim;
 pub mod solve;
 pub mod space;
 pub mod stress;
+pub mod sweep;
 #[doc(hidden)]
 pub mod testing;
 pub mod verify;

@@ -220,16 +220,17 @@ fn make(
     let end = job.plan.clock.end * job.plan.units.time;
     let mut pictures = vec![];
     let mut counted = 0;
-    let summary = run::into_folder(&job.plan, job.folder.clone(), interrupted, |run: &dyn Run| {
-        let time = run.row().time;
-        let due = figure.times.get(pictures.len());
-        if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
-            pictures.push(run.picture());
-        }
-        let part = (PARTS * time / end) as u64;
-        bar.inc(part.saturating_sub(counted));
-        counted = counted.max(part);
-    })?;
+    let summary =
+        run::into_folder(&job.plan, job.folder.clone(), true, interrupted, |run: &dyn Run| {
+            let time = run.row().time;
+            let due = figure.times.get(pictures.len());
+            if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
+                pictures.push(run.picture());
+            }
+            let part = (PARTS * time / end) as u64;
+            bar.inc(part.saturating_sub(counted));
+            counted = counted.max(part);
+        })?;
     let outflow = summary.gauges.values().next();
     let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} m2", g.volume));
     let took = duration(summary.seconds.get("total").copied().unwrap_or_default());

@@ -11,6 +11,7 @@ mod presets;
 mod purchase;
 mod run;
 mod stress;
+mod sweep;
 mod verify;
 
 use crate::cases::CaseError;
@@ -52,6 +53,7 @@ Examples:
   grainscope run presets/silo.toml --set alpha=5/3 --out runs/stiff
   grainscope run shear_alignment --save align.rrd --serve   save and watch at once
   grainscope compare runs/silo runs/stiff               side by side, and how they differ
+  grainscope sweep silo --vary alpha=0,1/3,5/3 --repeat-seeds 3   many runs, one table
   grainscope plan silo                                  which effects are solved, and why
   grainscope presets show silo                          the scene as TOML";
 
@@ -86,6 +88,8 @@ enum Command {
     Cost(cost::Args),
     /// Compare runs: values, curves, fields, scenes, and one recording side by side
     Compare(compare::Args),
+    /// Run a scene for many values of its parameters, here or on a cluster
+    Sweep(sweep::Args),
     /// Make a figure of the source: runs, plots, snapshots, a recording side by side
     Figure(figure::Args),
     /// Print the JSON schema of scene files
@@ -188,6 +192,7 @@ pub fn main() -> ExitCode {
         Command::Stress(args) => stress::run(&args),
         Command::Cost(args) => cost::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Figure(args) => figure::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
