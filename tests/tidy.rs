@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the house, ground floor first, and what each may import.
-const ROOMS: [(&str, &[&str]); 18] = [
+const ROOMS: [(&str, &[&str]); 19] = [
     ("testing", &[]),
     ("laws", &[]),
     ("frame", &[]),
@@ -20,13 +20,14 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ("record", &["frame", "scene", "space", "plan", "sim"]),
     ("stress", &["scene", "plan", "sim", "cases", "verify", "space"]),
     ("compare", &["frame", "scene", "plan", "record"]),
+    ("export", &["frame", "compare"]),
     ("sweep", &["scene", "plan", "record", "testing"]),
     ("explorer", &["frame", "scene", "plan", "sim", "cost", "record", "stress"]),
     (
         "commands",
         &[
             "frame", "scene", "plan", "sim", "cases", "verify", "cost", "stress", "record",
-            "compare", "explorer", "sweep",
+            "compare", "explorer", "sweep", "export",
         ],
     ),
 ];

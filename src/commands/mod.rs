@@ -5,6 +5,7 @@ mod compare;
 mod cost;
 mod cost_page;
 mod explore;
+mod export;
 mod figure;
 mod plan;
 mod presets;
@@ -88,6 +89,8 @@ enum Command {
     Cost(cost::Args),
     /// Compare runs: values, curves, fields, scenes, and one recording side by side
     Compare(compare::Args),
+    /// Export a recording's particles and fields: VTK files for ParaView, or tables
+    Export(export::Args),
     /// Run a scene for many values of its parameters, here or on a cluster
     Sweep(sweep::Args),
     /// Make a figure of the source: runs, plots, snapshots, a recording side by side
@@ -192,6 +195,7 @@ pub fn main() -> ExitCode {
         Command::Stress(args) => stress::run(&args),
         Command::Cost(args) => cost::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Figure(args) => figure::run(&args),
         Command::Schema => print(&scene::json_schema()),

@@ -8,7 +8,7 @@ use crate::scene::SceneSource;
 use crate::sweep::collect::Collection;
 use crate::sweep::{
     Case, Engine, Event, HyperQueue, Limits, List, Local, Spec, State, Store, SweepError, Work,
-    preset_list, preset_source, read_file,
+    preset_list, preset_source, read_file, similar,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -194,7 +194,7 @@ fn spec(args: &Args) -> Result<Spec, Failure> {
 fn sweep(args: &Args) -> Result<(), Failure> {
     let clock = Instant::now();
     let mut spec = spec(args)?;
-    let source = super::source(&spec.scene, &[])?;
+    let source = super::source(&spec.scene, &[]).map_err(|e| propose(e, &spec.scene))?;
     if spec.name.is_empty() {
         spec.name = crate::scene::parse(&source)?.name;
     }
@@ -228,6 +228,17 @@ fn sweep(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Interrupted);
     }
     verdict(&store, &list)
+}
+
+/// A name that is no scene may be a sweep's, mistyped.
+fn propose(failure: Failure, name: &str) -> Failure {
+    match (similar(name), failure) {
+        (Some(sweep), Failure::Scene(e)) if e.span().is_none() => Failure::Usage(format!(
+            "there is no scene and no sweep `{name}`\n  help: did you mean the sweep `{sweep}`? \
+             `grainscope sweep presets` and `grainscope presets` list what there is"
+        )),
+        (_, failure) => failure,
+    }
 }
 
 fn engine(args: &Args) -> Result<Box<dyn Engine>, Failure> {

@@ -34,8 +34,9 @@ impl Limits {
         let mut system = sysinfo::System::new();
         system.refresh_memory();
         let free = system.available_memory();
-        // In a container the machine's memory is not all ours.
-        let ours = system.cgroup_limits().map_or(free, |c| free.min(c.free_memory));
+        // In a container the machine's memory is not all ours; files it has cached count as free.
+        let limit = |c: sysinfo::CGroupLimits| free.min(c.total_memory.saturating_sub(c.rss));
+        let ours = system.cgroup_limits().map_or(free, limit);
         Limits {
             jobs: jobs.unwrap_or((cores / threads.max(1)).max(1)),
             threads,

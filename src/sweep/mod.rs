@@ -17,8 +17,8 @@ mod vary;
 pub use hq::HyperQueue;
 pub use list::{Case, List};
 pub use local::{Limits, Local};
-pub use spec::{PlotSpec, Spec, preset_list, preset_source, read_file};
-pub use store::{Attempt, State, Store, peak_memory};
+pub use spec::{PlotSpec, Spec, preset_list, preset_source, read_file, similar};
+pub use store::{Attempt, State, Store};
 pub use vary::{Sample, values_of};
 
 use crate::scene::SceneError;

@@ -151,7 +151,7 @@ fn read(name: &str, text: &str) -> Result<Spec, SweepError> {
     Ok(spec)
 }
 
-/// A preset with a similar name, to be proposed.
+/// The sweep of a similar name, to be proposed.
 pub fn similar(name: &str) -> Option<&'static str> {
     closest(name, PRESETS.iter().map(|p| p.0))
 }
