@@ -100,24 +100,21 @@ fn a_sweep_leaves_runs_tables_and_plots_and_runs_again_only_what_is_missing() {
 #[test]
 fn what_fails_stops_nothing_and_is_tried_again() {
     let here = TempFolder::new();
-    // One correction does not reach the tolerance at this contrast.
+    // Without a background nothing fills what the grains leave free; that is seen at the start.
     let arguments = small(&[
         "--vary",
-        "accuracy.max_corrections=1,20",
-        "--set",
-        "contrast=1e6",
+        "materials.background.background=false,true",
         "--out",
         "s",
         "--no-recordings",
     ]);
     let said = here.grainscope(&arguments).exits(6);
-    let said = said.complains(&["1 of 2 cases are not done", "max_corrections = 1:", "s/failed"]);
+    let said = said.complains(&["1 of 2 cases are not done", "background.background = false:", "s/failed"]);
     assert!(said.out.contains("1 of 2 cases are done"), "{}", said.out);
     let table = Table::read(&here.read("s/table.csv").replace(", ", " "));
     assert_eq!(table.text("state"), ["failed", "done"]);
     assert!(!table.text("cause")[0].is_empty());
     let failed = ids(&here, "s").remove(0);
-    assert!(here.has(&format!("s/failed/{failed}/series.csv")));
     assert!(here.json(&format!("s/failed/{failed}/case.json"))["cause"].is_string());
     let again = here.grainscope(&arguments).exits(6);
     assert!(again.err.contains("2 cases, 1 done before"), "{}", again.err);
@@ -361,8 +358,8 @@ fn recordings_are_exported_for_other_programs() {
     here.grainscope(&["export", "r", "--format", "vtu"]).exits(0).prints(&["r/vtu"]);
     here.grainscope(&["export", "r/recording.rrd", "--format", "csv", "--out", "t"]).exits(0);
     let frames = Table::read(&here.read("t/frames.csv")).numbers("time");
-    assert!(frames.len() > 2 && frames[0] == 0.0 && (frames.last() == Some(&3e-4)), "{frames:?}");
     let last = frames.len() - 1;
+    assert!(last > 1 && frames[0] == 0.0 && (frames[last] - 3e-4).abs() < 1e-9, "{frames:?}");
     let particles = Table::read(&here.read(&format!("t/particles_{last:05}.csv")));
     assert!(particles.text("material").iter().all(|m| ["grains", "marked"].contains(m)));
     // What has left the silo is below the floor.
@@ -381,7 +378,7 @@ fn recordings_are_exported_for_other_programs() {
 
     let series = here.read("r/vtu/fields.pvd");
     assert_eq!(series.matches("<DataSet ").count(), frames.len());
-    assert!(series.contains(&format!("fields_{last:05}.vtu")) && series.contains("3"));
+    assert!(series.contains(&format!("fields_{last:05}.vtu")));
     let text = here.read(&format!("r/vtu/particles_{last:05}.vtu"));
     let count = particles.rows.len();
     assert!(text.contains(&format!("NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\"")));
