@@ -287,7 +287,8 @@ mod tests {
         let other = list(&["contrast=100,10", "alpha=1/3,0"], |_| ()).expect("valid");
         let (mut a, mut b) = (ids(&one), ids(&other));
         assert_ne!(a, b);
-        (a.sort(), b.sort());
+        a.sort();
+        b.sort();
         assert_eq!(a, b);
         assert_eq!(a.len(), 4);
         // A set of all cases that a case had anyhow changes nothing.

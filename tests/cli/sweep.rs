@@ -109,7 +109,11 @@ fn what_fails_stops_nothing_and_is_tried_again() {
         "--no-recordings",
     ]);
     let said = here.grainscope(&arguments).exits(6);
-    let said = said.complains(&["1 of 2 cases are not done", "background.background = false:", "s/failed"]);
+    let said = said.complains(&[
+        "1 of 2 cases are not done",
+        "background.background = false:",
+        "s/failed",
+    ]);
     assert!(said.out.contains("1 of 2 cases are done"), "{}", said.out);
     let table = Table::read(&here.read("s/table.csv").replace(", ", " "));
     assert_eq!(table.text("state"), ["failed", "done"]);
