@@ -125,6 +125,9 @@ impl Store {
 
     /// Starts on a case: waits for whoever else is at it; `None` if that one has finished it.
     pub fn begin(&self, id: &str) -> Result<Option<Attempt>, SweepError> {
+        if self.state(id) == State::Done {
+            return Ok(None);
+        }
         let running = self.root.join("running");
         fs::create_dir_all(&running).map_err(SweepError::file("make", &running))?;
         let path = running.join(format!("{id}.lock"));
@@ -141,6 +144,8 @@ impl Store {
             }
         }
         if self.state(id) == State::Done {
+            // It is the one that we have waited for.
+            let _ = fs::remove_file(&path);
             return Ok(None);
         }
         let folder = self.running(id);
