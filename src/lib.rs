@@ -10,6 +10,7 @@
 //!   source, as functions of small matrices.
 //! - [`record`] writes recordings, tables and plots, and [`compare`] reads them back; [`cases`] are
 //!   scenes with exact solutions, [`verify`] measures them, and [`cost`] says what accuracy costs.
+//! - [`sweep`] makes many runs of one scene; [`export`] hands recordings to other programs.
 //! - [`explorer`] is a run that listens, and a page that shows it.
 //!
 //! ```
@@ -38,6 +39,7 @@ pub mod commands;
 pub mod compare;
 pub mod cost;
 pub mod explorer;
+pub mod export;
 pub mod frame;
 pub mod laws;
 pub mod motion;
@@ -48,6 +50,7 @@ pub mod sim;
 pub mod solve;
 pub mod space;
 pub mod stress;
+pub mod sweep;
 #[doc(hidden)]
 pub mod testing;
 pub mod threads;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms of the house, ground floor first, and what each may import.
-const ROOMS: [(&str, &[&str]); 18] = [
+const ROOMS: [(&str, &[&str]); 20] = [
     ("testing", &[]),
     ("threads", &[]),
     ("laws", &[]),
@@ -21,12 +21,14 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ("record", &["frame", "scene", "space", "plan", "sim"]),
     ("stress", &["scene", "plan", "sim", "cases", "verify", "space", "threads"]),
     ("compare", &["frame", "scene", "plan", "record"]),
+    ("export", &["frame", "compare"]),
+    ("sweep", &["scene", "plan", "record", "testing"]),
     ("explorer", &["frame", "scene", "plan", "sim", "cost", "record", "stress"]),
     (
         "commands",
         &[
             "frame", "scene", "plan", "sim", "cases", "verify", "cost", "stress", "record",
-            "compare", "explorer",
+            "compare", "explorer", "sweep", "export",
         ],
     ),
 ];

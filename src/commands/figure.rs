@@ -11,6 +11,7 @@ use crate::record::text::duration;
 use crate::record::{folder, info};
 use crate::scene::presets;
 use crate::sim::Run;
+use crate::sweep;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -52,8 +53,10 @@ struct Figure {
     name: &'static str,
     preset: &'static str,
     title: &'static str,
-    /// Runs: name, folder, settings.
-    cases: &'static [(&'static str, &'static str, &'static [&'static str])],
+    /// The sweep that the runs are of, and how what it varies is named; without, there is one run.
+    sweep: Option<(&'static str, &'static str)>,
+    /// The name of that one.
+    single: &'static str,
     /// Settings of all runs.
     sets: &'static [&'static str],
     quick: &'static [&'static str],
@@ -68,20 +71,10 @@ const SILO: Figure = Figure {
     name: "silo",
     preset: "silo",
     title: "Discharge of a silo for five internal lengths R, aperture a",
-    cases: &[
-        ("R/a = 0", "alpha_0", &["alpha=0"]),
-        ("R/a = 1/3", "alpha_1_3", &["alpha=1/3"]),
-        ("R/a = 2/3", "alpha_2_3", &["alpha=2/3"]),
-        ("R/a = 5/3", "alpha_5_3", &["alpha=5/3"]),
-        ("R/a = 10/3", "alpha_10_3", &["alpha=10/3"]),
-    ],
-    sets: &["recording.frames=40"],
-    quick: &[
-        "accuracy.cells=2",
-        "time.end=1.42e-3",
-        "recording.times=[4.75e-4, 1.42e-3]",
-        "recording.frames=8",
-    ],
+    sweep: Some(("fig3", "R/a")),
+    single: "",
+    sets: &[],
+    quick: &[],
     times: &[0.0, 4.75e-4, 1.42e-3, 2.85e-3, 3.8e-3],
     sheet: "snapshots",
 };
@@ -91,7 +84,8 @@ const ALIGNMENT: Figure = Figure {
     name: "alignment",
     preset: "shear_alignment",
     title: "Texture in shear: dyed line, directors and isovalues of mean |n_x|",
-    cases: &[("R/H = 0.2", "run", &[])],
+    sweep: None,
+    single: "R/H = 0.2",
     sets: &["time.end=0.5", "recording.frames=50", "recording.times=[0.05, 0.15, 0.5]"],
     quick: &["accuracy.cells=16", "recording.frames=10"],
     times: &[0.05, 0.15, 0.5],
@@ -109,7 +103,7 @@ impl Name {
 
 /// A run that is to be made.
 struct Job {
-    name: &'static str,
+    name: String,
     plan: Arc<Plan>,
     folder: PathBuf,
 }
@@ -125,8 +119,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let times = figure.times.iter().take(reached);
     let columns = times.map(|t| format!("t = {} s", short(*t))).collect();
     let rows = jobs.iter().zip(pictures).map(|(job, pictures)| Row {
-        name: job.name.into(),
-        info: info::run_info(&job.plan, job.name),
+        name: job.name.clone(),
+        info: info::run_info(&job.plan, &job.name),
         pictures,
     });
     sheet(
@@ -152,13 +146,30 @@ fn jobs(figure: &Figure, args: &Args, out: &Path) -> Result<Vec<Job>, Failure> {
     let source = presets::find(figure.preset)?;
     let quick: &[&str] = if args.quick { figure.quick } else { &[] };
     let mut jobs = vec![];
-    for (name, folder, sets) in figure.cases {
-        let sets = figure.sets.iter().chain(quick).chain(*sets).map(|s| s.to_string());
-        let (_, plan) = super::resolve(&source.with_sets(&sets.collect::<Vec<_>>())?)?;
-        let folder = folder::create(folder, Some(&out.join(folder)), args.force)?;
+    for (name, folder, sets) in cases(figure, args.quick)? {
+        let own = figure.sets.iter().chain(quick).map(|s| s.to_string());
+        let (_, plan) = super::resolve(&source.with_sets(&own.chain(sets).collect::<Vec<_>>())?)?;
+        let folder = folder::create(&folder, Some(&out.join(&folder)), args.force)?;
         jobs.push(Job { name, plan: Arc::new(plan), folder });
     }
     Ok(jobs)
+}
+
+/// Names, folders and settings of the runs: those of the figure's sweep.
+fn cases(figure: &Figure, quick: bool) -> Result<Vec<(String, String, Vec<String>)>, Failure> {
+    let Some((sweep, symbol)) = figure.sweep else {
+        return Ok(vec![(figure.single.into(), "run".into(), vec![])]);
+    };
+    let missing = || Failure::Environment(format!("the sweep {sweep} is not part of the program"));
+    let spec = sweep::read_file(sweep)?.ok_or_else(missing)?;
+    let spec = if quick { spec.quick() } else { spec };
+    let list = sweep::List::new(&super::source(&spec.scene, &[])?, &spec)?;
+    let named = |case: &sweep::Case| {
+        let (name, value) = case.values.first().ok_or_else(missing)?;
+        let folder = format!("{name}_{}", value.replace('/', "_"));
+        Ok((format!("{symbol} = {value}"), folder, case.sets.clone()))
+    };
+    list.cases.iter().map(named).collect()
 }
 
 /// Runs everything, some at once; pictures of each run at the figure's times.
@@ -220,16 +231,17 @@ fn make(
     let end = job.plan.clock.end * job.plan.units.time;
     let mut pictures = vec![];
     let mut counted = 0;
-    let summary = run::into_folder(&job.plan, job.folder.clone(), interrupted, |run: &dyn Run| {
-        let time = run.row().time;
-        let due = figure.times.get(pictures.len());
-        if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
-            pictures.push(run.picture());
-        }
-        let part = (PARTS * time / end) as u64;
-        bar.inc(part.saturating_sub(counted));
-        counted = counted.max(part);
-    })?;
+    let summary =
+        run::into_folder(&job.plan, job.folder.clone(), true, interrupted, |run: &dyn Run| {
+            let time = run.row().time;
+            let due = figure.times.get(pictures.len());
+            if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
+                pictures.push(run.picture());
+            }
+            let part = (PARTS * time / end) as u64;
+            bar.inc(part.saturating_sub(counted));
+            counted = counted.max(part);
+        })?;
     let outflow = summary.gauges.values().next();
     let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} m2", g.volume));
     let took = duration(summary.seconds.get("total").copied().unwrap_or_default());
@@ -242,7 +254,7 @@ fn side_by_side(jobs: &[Job], path: &Path) -> Result<String, Failure> {
     let folders: Vec<PathBuf> = jobs.iter().map(|job| job.folder.clone()).collect();
     let mut members = compare::open_all(&folders)?;
     for (member, job) in members.iter_mut().zip(jobs) {
-        member.rename(job.name);
+        member.rename(&job.name);
     }
     let found = compare::compare(&members, &[])?;
     let (found, _) = comparison::write(found, &members, path, &[Sink::Save(path.to_owned())])?;

@@ -5,12 +5,14 @@ mod compare;
 mod cost;
 mod cost_page;
 mod explore;
+mod export;
 mod figure;
 mod plan;
 mod presets;
 mod purchase;
 mod run;
 mod stress;
+mod sweep;
 mod verify;
 
 use crate::cases::CaseError;
@@ -52,6 +54,7 @@ Examples:
   grainscope run presets/silo.toml --set alpha=5/3 --out runs/stiff
   grainscope run shear_alignment --save align.rrd --serve   save and watch at once
   grainscope compare runs/silo runs/stiff               side by side, and how they differ
+  grainscope sweep silo --vary alpha=0,1/3,5/3 --repeat-seeds 3   many runs, one table
   grainscope plan silo                                  which effects are solved, and why
   grainscope presets show silo                          the scene as TOML";
 
@@ -89,6 +92,10 @@ enum Command {
     Cost(cost::Args),
     /// Compare runs: values, curves, fields, scenes, and one recording side by side
     Compare(compare::Args),
+    /// Export a recording's particles and fields: VTK files for ParaView, or tables
+    Export(export::Args),
+    /// Run a scene for many values of its parameters, here or on a cluster
+    Sweep(sweep::Args),
     /// Make a figure of the source: runs, plots, snapshots, a recording side by side
     Figure(figure::Args),
     /// Print the JSON schema of scene files
@@ -210,6 +217,8 @@ fn run_command(command: Command) -> Result<(), Failure> {
         Command::Stress(args) => stress::run(&args),
         Command::Cost(args) => cost::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Figure(args) => figure::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {

@@ -104,12 +104,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 pub(super) fn into_folder(
     plan: &Arc<Plan>,
     folder: PathBuf,
+    recorded: bool,
     interrupted: &Arc<AtomicBool>,
     watch: impl FnMut(&dyn Run),
 ) -> Result<Summary, Failure> {
     let clock = Instant::now();
     let run = sim::start(plan.clone())?;
-    let args = Args { quiet: true, ..Args::default() };
+    let args = Args { quiet: true, no_recording: !recorded, ..Args::default() };
     let mut session = Session::open(&args, plan, run, folder, clock, interrupted.clone())?;
     let outcome = session.compute(watch);
     let ended = session.end(outcome)?;
@@ -477,7 +478,7 @@ impl Session {
 }
 
 /// A failure in one line, for the summary.
-fn describe(f: &Failure) -> Option<String> {
+pub(super) fn describe(f: &Failure) -> Option<String> {
     match f {
         Failure::Sim(e) => Some(format!("{e}; {}", SimError::remedy(e))),
         Failure::Environment(text) | Failure::Usage(text) => Some(text.clone()),

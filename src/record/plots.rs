@@ -95,20 +95,26 @@ pub struct PlotError {
 
 /// Writes `<stem>.svg` and `<stem>.png`.
 pub fn line_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
-    write(stem, &Panels(std::slice::from_ref(plot)), SIZE)
+    write(stem, &Panels::of(std::slice::from_ref(plot)), SIZE)
+}
+
+/// Writes `<stem>.svg` and `<stem>.png`; `bars` has, for each point of each curve, how far it may be
+/// off either way.
+pub fn spread_plot(stem: &Path, plot: &PlotSpec, bars: &[Vec<f64>]) -> Result<(), PlotError> {
+    write(stem, &Panels { plots: std::slice::from_ref(plot), bars }, SIZE)
 }
 
 /// Writes `<stem>.svg` only.
 pub fn svg_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
     let path = with_suffix(stem, ".svg");
-    let panels = Panels(std::slice::from_ref(plot));
+    let panels = Panels::of(std::slice::from_ref(plot));
     to_svg(&path, &panels, SIZE).map_err(|cause| PlotError { path, cause })
 }
 
 /// Writes several plots, one below the other, to `<stem>.svg` and `<stem>.png`.
 pub fn panels_plot(stem: &Path, plots: &[PlotSpec]) -> Result<(), PlotError> {
     let count = u32::try_from(plots.len()).unwrap_or(1).max(1);
-    write(stem, &Panels(plots), (SIZE.0, PANEL_HEIGHT * count))
+    write(stem, &Panels::of(plots), (SIZE.0, PANEL_HEIGHT * count))
 }
 
 /// Not `with_extension`: a stem such as `dt_0.01` has none to replace.
@@ -255,13 +261,24 @@ impl Pen {
 }
 
 /// Plots, one below the other.
-struct Panels<'a>(&'a [PlotSpec]);
+struct Panels<'a> {
+    plots: &'a [PlotSpec],
+    /// Of the points of the curves of a single plot.
+    bars: &'a [Vec<f64>],
+}
+
+impl<'a> Panels<'a> {
+    fn of(plots: &'a [PlotSpec]) -> Self {
+        Panels { plots, bars: &[] }
+    }
+}
 
 impl Drawing for Panels<'_> {
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, pen: Pen) -> Drawn<B> {
         root.fill(&WHITE)?;
-        for (area, plot) in root.split_evenly((self.0.len().max(1), 1)).iter().zip(self.0) {
-            Panel::new(area, plot, pen).draw()?;
+        let areas = root.split_evenly((self.plots.len().max(1), 1));
+        for (area, plot) in areas.iter().zip(self.plots) {
+            Panel::new(area, plot, self.bars, pen).draw()?;
         }
         Ok(())
     }
@@ -426,6 +443,7 @@ fn axis_label(axis: &Axis, exponent: i32) -> String {
 struct Panel<'a, B: DrawingBackend> {
     area: &'a DrawingArea<B, Shift>,
     plot: &'a PlotSpec,
+    bars: &'a [Vec<f64>],
     pen: Pen,
     /// Left, top, right, bottom of the frame (pixels of the backend).
     frame: [i32; 4],
@@ -437,7 +455,12 @@ struct Panel<'a, B: DrawingBackend> {
 const LEGEND_ROW: f64 = 30.0;
 
 impl<'a, B: DrawingBackend> Panel<'a, B> {
-    fn new(area: &'a DrawingArea<B, Shift>, plot: &'a PlotSpec, pen: Pen) -> Self {
+    fn new(
+        area: &'a DrawingArea<B, Shift>,
+        plot: &'a PlotSpec,
+        bars: &'a [Vec<f64>],
+        pen: Pen,
+    ) -> Self {
         let (width, height) = area.dim_in_pixel();
         let (left, right) =
             (pen.px(105.0), i32::try_from(width).unwrap_or(i32::MAX) - pen.px(35.0));
@@ -448,7 +471,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
             right,
             i32::try_from(height).unwrap_or(i32::MAX) - pen.px(68.0),
         ];
-        Self { area, plot, pen, frame, legend }
+        Self { area, plot, bars, pen, frame, legend }
     }
 
     /// Names of several curves, in as many rows as they need. One curve needs none.
@@ -511,8 +534,9 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
             let fits = |value: f64, log: bool| value.is_finite() && (!log || value > 0.0);
             fits(x, self.plot.x.log) && fits(y, self.plot.y.log)
         };
+        let ends: Vec<(f64, f64)> = self.bar_ends().into_iter().flatten().collect();
         let points = self.plot.curves.iter().flat_map(|curve| &curve.points);
-        let points = points.filter(usable);
+        let points = points.chain(&ends).filter(usable);
         let scales = (
             Scale::new(&self.plot.x, points.clone().map(|p| p.0)),
             Scale::new(&self.plot.y, points.map(|p| p.1)),
@@ -523,6 +547,9 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
             self.axes(&x, &y)?;
             for (curve, color) in self.plot.curves.iter().zip(OKABE_ITO.iter().cycle()) {
                 self.curve(curve, *color, &x, &y)?;
+            }
+            for (ends, color) in self.bar_ends().iter().zip(OKABE_ITO.iter().cycle()) {
+                self.bars_of(ends, *color, &x, &y)?;
             }
         } else {
             let at = (middle, (top + bottom) / 2);
@@ -581,6 +608,36 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
                 let pos = Pos::new(HPos::Left, VPos::Center);
                 self.text(&self.plot.curves[k].name, 18.0, (at + line + gap, y), pos)?;
                 at += width + Self::swatch(self.pen);
+            }
+        }
+        Ok(())
+    }
+
+    /// Lower and upper ends of the bars of each curve, in turn.
+    fn bar_ends(&self) -> Vec<Vec<(f64, f64)>> {
+        let ends = |(curve, bars): (&Curve, &Vec<f64>)| {
+            let both = |(&(x, y), bar): (&(f64, f64), &f64)| [(x, y - bar), (x, y + bar)];
+            let seen = curve.points.iter().zip(bars).filter(|(_, bar)| **bar > 0.0);
+            seen.flat_map(both).collect()
+        };
+        self.plot.curves.iter().zip(self.bars).map(ends).collect()
+    }
+
+    fn bars_of(&self, ends: &[(f64, f64)], [r, g, b]: [u8; 3], x: &Scale, y: &Scale) -> Drawn<B> {
+        let [left, top, right, bottom] = self.frame;
+        let (width, height) = (f64::from(right - left), f64::from(bottom - top));
+        let style = self.line(RGBColor(r, g, b), 2.0);
+        let half = self.px(6.0);
+        for pair in ends.chunks_exact(2) {
+            let place = |(px, py): (f64, f64)| {
+                // A lower end that a logarithm cannot show is beyond the frame.
+                let (u, v) = (x.place(px)?, y.place(py).unwrap_or(0.0));
+                Some((left + (u * width).round() as i32, bottom - (v * height).round() as i32))
+            };
+            let (Some(low), Some(high)) = (place(pair[0]), place(pair[1])) else { continue };
+            self.area.draw(&PathElement::new([low, high], style))?;
+            for (at, y) in [low, high] {
+                self.area.draw(&PathElement::new([(at - half, y), (at + half, y)], style))?;
             }
         }
         Ok(())

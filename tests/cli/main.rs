@@ -7,6 +7,7 @@ mod recording;
 mod refusals;
 mod runs;
 mod stress;
+mod sweep;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

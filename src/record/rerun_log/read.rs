@@ -11,7 +11,7 @@ use rerun::log::{Chunk, LogMsg};
 use rerun::{archetypes, components};
 
 use super::{RUNS, SIM_TIME, WALL_TIME};
-use crate::frame::{GridField, Rect};
+use crate::frame::{GridField, ParticleSnapshot, Rect};
 
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -159,6 +159,32 @@ impl Recorded {
             samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         }
         curves
+    }
+
+    /// The particles of each picture, by time.
+    pub fn particles(&self) -> Vec<(f64, ParticleSnapshot)> {
+        let positions = archetypes::Points2D::descriptor_positions().component;
+        let classes = archetypes::Points2D::descriptor_class_ids().component;
+        let mut pictures: Vec<(f64, Vec<[f32; 2]>)> = vec![];
+        // Written only where they change.
+        let mut changes: Vec<(f64, Vec<u16>)> = vec![];
+        for (chunk, _) in self.of_run().filter(|(_, path)| *path == ["world", "particles"]) {
+            let times = seconds(chunk, SIM_TIME, positions);
+            let points = chunk.iter_slices::<[f32; 2]>(positions).map(<[_]>::to_vec);
+            pictures.extend(times.into_iter().zip(points));
+            let times = seconds(chunk, SIM_TIME, classes);
+            let numbers = chunk.iter_slices::<u16>(classes).map(<[_]>::to_vec);
+            changes.extend(times.into_iter().zip(numbers));
+        }
+        pictures.sort_by(|a, b| a.0.total_cmp(&b.0));
+        changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let snapshot = |(time, positions): (f64, Vec<[f32; 2]>)| {
+            let last = changes.partition_point(|c| c.0 <= time).checked_sub(1);
+            let mut class = last.map_or(vec![], |k| changes[k].1.clone());
+            class.resize(positions.len(), 0);
+            (time, ParticleSnapshot { positions, class, scalar: None })
+        };
+        pictures.into_iter().map(snapshot).collect()
     }
 
     /// The pictures of each field that fills `domain`, by time.

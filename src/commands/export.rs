@@ -1,0 +1,45 @@
+//! `grainscope export`: the pictures of a recording for other programs.
+
+use super::{Failure, print};
+use crate::export::{self, ExportError, Format};
+use std::path::PathBuf;
+
+/// Export particles and fields of every frame, for ParaView or as tables.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder of a run, or a recording
+    run: PathBuf,
+    /// vtu: VTK files and .pvd series that ParaView opens; csv: tables
+    #[arg(long, value_enum)]
+    format: FormatName,
+    /// Folder of the files [default: <folder of the run>/<format>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum FormatName {
+    Vtu,
+    Csv,
+}
+
+impl From<ExportError> for Failure {
+    fn from(e: ExportError) -> Self {
+        match e {
+            ExportError::Run(e) => e.into(),
+            other => Failure::Environment(other.to_string()),
+        }
+    }
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let film = export::read(&args.run)?;
+    let (format, name) = match args.format {
+        FormatName::Vtu => (Format::Vtu, "vtu"),
+        FormatName::Csv => (Format::Csv, "csv"),
+    };
+    let beside = if args.run.is_dir() { Some(args.run.as_path()) } else { args.run.parent() };
+    let folder = args.out.clone().unwrap_or_else(|| beside.unwrap_or(&args.run).join(name));
+    let files = export::write(&film, format, &folder)?;
+    print(&format!("wrote {files} files of {} frames to {}", film.instants.len(), folder.display()))
+}

@@ -1,0 +1,470 @@
+//! `grainscope sweep`: many runs of one scene, on this machine or through HyperQueue.
+
+use super::{Failure, compare as comparison, print, run};
+use crate::compare;
+use crate::record::rerun_log::Sink;
+use crate::record::text::duration;
+use crate::scene::SceneSource;
+use crate::sweep::collect::Collection;
+use crate::sweep::{
+    Case, Engine, Event, HyperQueue, Limits, List, Local, Spec, State, Store, SweepError, Work,
+    preset_list, preset_source, read_file, similar,
+};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Most runs that stand side by side unless they are named.
+const MOST_SIDE_BY_SIDE: usize = 8;
+
+/// Steps of the progress bar.
+const PARTS: f64 = 10_000.0;
+
+const EXAMPLES: &str = "\
+Examples:
+  grainscope sweep fig3                                 the source's Fig. 3, with one command
+  grainscope sweep silo --vary alpha=0,1/3,5/3 --vary contrast=log:10..1e4:4 --repeat-seeds 3
+  grainscope sweep silo --vary alpha=0..3 --vary aperture=0.5..2 --sample sobol:32
+  grainscope sweep silo --vary alpha=0..3:7 --engine hq on a cluster: HyperQueue's workers run it
+  grainscope sweep collect sweeps/silo                  table, plots
+  grainscope sweep list sweeps/silo --missing | parallel grainscope sweep case sweeps/silo";
+
+/// Run a scene for many values of its parameters.
+///
+/// Cases that are done are not run again: the same command goes on where the last one ended, and
+/// tries again what failed. SCENE is a preset's name, a scene file, a sweep of the program
+/// (`grainscope sweep presets`) or a sweep file.
+#[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// What is run: a scene or a sweep
+    #[arg(required = true)]
+    scene: Option<String>,
+    /// Values of a parameter or key: alpha=0,1/3,5/3 or alpha=0..1:5 or contrast=log:1e1..1e6:6
+    #[arg(long, value_name = "NAME=VALUES")]
+    vary: Vec<String>,
+    /// Set a parameter (contrast=100) or any key (accuracy.cells=16) in all cases
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// Fill ranges without a count (alpha=0..1) with this many points of a Sobol sequence
+    #[arg(long, value_name = "sobol:N")]
+    sample: Option<String>,
+    /// Run every case with this many seeds of its particles and random directors
+    #[arg(long, value_name = "K")]
+    repeat_seeds: Option<u32>,
+    /// Folder of the sweep [default: sweeps/<name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Where cases run
+    #[arg(long, value_enum, default_value_t = EngineName::Local)]
+    engine: EngineName,
+    /// Most cases at once [default: as many as cores and memory hold]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    jobs: Option<u32>,
+    /// Cores of each case
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    cores: u32,
+    /// Coarse and short, for sweeps that say how: to see whether it works
+    #[arg(long)]
+    quick: bool,
+    /// Write no recordings
+    #[arg(long)]
+    no_recordings: bool,
+    /// Write cases.json, say what would run, and end
+    #[arg(long)]
+    dry_run: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum EngineName {
+    /// Processes on this machine
+    Local,
+    /// Tasks of a HyperQueue server, started with `hq` or what HQ_ENTRY names
+    Hq,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Gather all cases: one table, spread over seeds, plots, a recording side by side
+    Collect {
+        /// Folder of the sweep
+        folder: PathBuf,
+        /// Put these cases side by side: numbers or ids; without any, those of the first seed
+        #[arg(long, num_args = 0.., value_name = "CASE")]
+        side_by_side: Option<Vec<String>>,
+    },
+    /// Run one case: for arrays of batch systems
+    Case {
+        /// Folder of the sweep
+        folder: PathBuf,
+        /// Number or id
+        case: String,
+        /// End when the standard input ends
+        #[arg(long, hide = true)]
+        stop_with_input: bool,
+    },
+    /// List the cases
+    List {
+        /// Folder of the sweep
+        folder: PathBuf,
+        /// Ids of those that are not done, one a line
+        #[arg(long)]
+        missing: bool,
+    },
+    /// List the sweeps that come with the program, or show one
+    Presets {
+        /// Show this one
+        name: Option<String>,
+    },
+}
+
+impl From<SweepError> for Failure {
+    fn from(e: SweepError) -> Self {
+        match e {
+            SweepError::Scene(e) => e.into(),
+            SweepError::Usage(text) => Failure::Usage(text),
+            other => Failure::Environment(other.to_string()),
+        }
+    }
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    match &args.command {
+        None => sweep(args),
+        Some(Command::Collect { folder, side_by_side }) => {
+            let store = Store::new(folder);
+            let (list, _) = store.read()?;
+            collect(&store, &list, side_by_side.as_deref())
+        }
+        Some(Command::Case { folder, case, stop_with_input }) => {
+            one(&Store::new(folder), case, *stop_with_input)
+        }
+        Some(Command::List { folder, missing }) => show_list(&Store::new(folder), *missing),
+        Some(Command::Presets { name: None }) => {
+            let lines =
+                preset_list().into_iter().map(|(name, about)| format!("{name:<14} {about}"));
+            print(&lines.collect::<Vec<_>>().join("\n"))
+        }
+        Some(Command::Presets { name: Some(name) }) => {
+            let names = || preset_list().into_iter().map(|p| p.0).collect::<Vec<_>>().join(", ");
+            let text = preset_source(name).ok_or_else(|| {
+                Failure::Usage(format!("there is no sweep `{name}`; there are {}", names()))
+            })?;
+            print(text)
+        }
+    }
+}
+
+/// What the command line asks for.
+fn spec(args: &Args) -> Result<Spec, Failure> {
+    let name = args.scene.clone().unwrap_or_default();
+    let known = read_file(&name)?;
+    if args.quick && known.is_none() {
+        return Err(Failure::Usage(format!(
+            "--quick: {name} is a scene and says not what is quick; --set accuracy.cells=2, say"
+        )));
+    }
+    let mut spec = known.unwrap_or_else(|| Spec {
+        schema: 1,
+        scene: name.clone(),
+        repeat_seeds: 1,
+        recordings: true,
+        ..Spec::default()
+    });
+    if args.quick {
+        spec = spec.quick();
+    }
+    let named = |v: &String| v.split('=').next().unwrap_or_default().trim().to_owned();
+    // What is varied on the command line replaces what the sweep varies.
+    let anew: Vec<String> = args.vary.iter().map(named).collect();
+    spec.vary.retain(|v| !anew.contains(&named(v)));
+    spec.vary.extend(args.vary.clone());
+    spec.set.extend(args.sets.clone());
+    spec.sample = args.sample.clone().or(spec.sample);
+    spec.repeat_seeds = args.repeat_seeds.unwrap_or(spec.repeat_seeds);
+    spec.recordings &= !args.no_recordings;
+    Ok(spec)
+}
+
+fn sweep(args: &Args) -> Result<(), Failure> {
+    let clock = Instant::now();
+    let mut spec = spec(args)?;
+    let source = super::source(&spec.scene, &[]).map_err(|e| propose(e, &spec.scene))?;
+    if spec.name.is_empty() {
+        spec.name = crate::scene::parse(&source)?.name;
+    }
+    let list = List::new(&source, &spec)?;
+    let out = args.out.clone().unwrap_or_else(|| Path::new("sweeps").join(&spec.name));
+    let store = Store::new(&out);
+    store.write(&list, &source)?;
+    let open: Vec<&Case> =
+        list.cases.iter().filter(|c| store.state(&c.id) != State::Done).collect();
+    let (all, done) = (list.cases.len(), list.cases.len() - open.len());
+    eprintln!("{all} cases, {done} done before, in {}", out.display());
+    let strangers = store.strangers(&list);
+    if strangers > 0 {
+        eprintln!("note: {strangers} finished runs in it are of other lists and left alone");
+    }
+    if args.dry_run {
+        return print(&plan_text(&open, args));
+    }
+    let interrupted = Arc::new(AtomicBool::new(false));
+    run::watch_interrupts(&interrupted);
+    if !open.is_empty() {
+        let engine = engine(args)?;
+        drive(engine.as_ref(), &store, open, &interrupted)?;
+    }
+    if list.cases.iter().any(|c| store.state(&c.id) == State::Done) {
+        collect(&store, &list, spec.side_by_side.then_some(&[][..]))?;
+    }
+    eprintln!("in {}", duration(clock.elapsed().as_secs_f64()));
+    if interrupted.load(Ordering::SeqCst) {
+        eprintln!("interrupted; what is finished is kept, and the same command goes on");
+        return Err(Failure::Interrupted);
+    }
+    verdict(&store, &list)
+}
+
+/// A name that is no scene may be a sweep's, mistyped.
+fn propose(failure: Failure, name: &str) -> Failure {
+    match (similar(name), failure) {
+        (Some(sweep), Failure::Scene(e)) if e.span().is_none() => Failure::Usage(format!(
+            "there is no scene and no sweep `{name}`\n  help: did you mean the sweep `{sweep}`? \
+             `grainscope sweep presets` and `grainscope presets` list what there is"
+        )),
+        (_, failure) => failure,
+    }
+}
+
+fn engine(args: &Args) -> Result<Box<dyn Engine>, Failure> {
+    let program = std::env::current_exe().map_err(|e| {
+        Failure::Environment(format!("this program cannot find itself to start cases: {e}"))
+    })?;
+    let threads = args.cores as usize;
+    Ok(match args.engine {
+        EngineName::Local => {
+            let limits = Limits::of_machine(args.jobs.map(|n| n as usize), threads);
+            Box::new(Local { program, limits })
+        }
+        EngineName::Hq => Box::new(HyperQueue::new(program, threads)),
+    })
+}
+
+/// Runs cases under one bar, and says what becomes of each.
+fn drive(
+    engine: &dyn Engine,
+    store: &Store,
+    cases: Vec<&Case>,
+    interrupted: &AtomicBool,
+) -> Result<(), Failure> {
+    let target = ProgressDrawTarget::stderr_with_hz(8);
+    let bar = ProgressBar::with_draw_target(Some(PARTS as u64), target);
+    let template = "{bar:30} {percent:>3} %  {msg}  {elapsed} of about {duration}";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    let count = cases.len();
+    let (mut done, mut failed) = (0, 0);
+    let mut watch = |event: Event| match event {
+        Event::Started(_) => {}
+        Event::Progress { share, running } => {
+            bar.set_position((PARTS * share) as u64);
+            bar.set_message(format!("{running} running, {done} of {count} done, {failed} failed"));
+        }
+        Event::Ended(case, state) => {
+            let end = match state {
+                State::Done => {
+                    done += 1;
+                    "done".to_owned()
+                }
+                State::Failed(cause) => {
+                    failed += 1;
+                    format!("failed: {cause}")
+                }
+                State::Missing => "not run".to_owned(),
+            };
+            bar.suspend(|| eprintln!("{} {}: {end}", case.id, case.label()));
+        }
+    };
+    let outcome = engine.run(&mut Work { store, cases, interrupted, watch: &mut watch });
+    bar.finish_and_clear();
+    Ok(outcome?)
+}
+
+/// What failed or is missing makes the sweep fail.
+fn verdict(store: &Store, list: &List) -> Result<(), Failure> {
+    let mut lines = vec![];
+    for case in &list.cases {
+        match store.state(&case.id) {
+            State::Done => {}
+            State::Failed(cause) => {
+                lines.push(format!("  {} {}: {cause}", case.id, case.label()));
+            }
+            State::Missing => lines.push(format!("  {} {}: not run", case.id, case.label())),
+        }
+    }
+    if lines.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::Differs(format!(
+        "{} of {} cases are not done; the same command tries them again\n{}\n  help: what failed \
+         runs left is in {}",
+        lines.len(),
+        list.cases.len(),
+        lines.join("\n"),
+        store.root().join("failed").display()
+    )))
+}
+
+/// One case, in this process.
+fn one(store: &Store, name: &str, stop_with_input: bool) -> Result<(), Failure> {
+    let (list, source) = store.read()?;
+    let case = list.case(name)?;
+    let interrupted = Arc::new(AtomicBool::new(false));
+    run::watch_interrupts(&interrupted);
+    if stop_with_input {
+        watch_input(&interrupted)?;
+    }
+    let Some(attempt) = store.begin(&case.id)? else {
+        return Ok(());
+    };
+    let outcome = solve(case, &source, attempt.folder(), list.spec.recordings, &interrupted);
+    match outcome {
+        Ok(()) => Ok(attempt.finish()?),
+        Err(Failure::Interrupted) => {
+            attempt.abandon();
+            Err(Failure::Interrupted)
+        }
+        Err(failure) => {
+            let cause = run::describe(&failure).unwrap_or_else(|| "it failed".into());
+            attempt.fail(&cause)?;
+            Err(failure)
+        }
+    }
+}
+
+fn solve(
+    case: &Case,
+    source: &SceneSource,
+    folder: &Path,
+    recorded: bool,
+    interrupted: &Arc<AtomicBool>,
+) -> Result<(), Failure> {
+    let plan = Arc::new(case.plan(source)?);
+    run::into_folder(&plan, folder.to_owned(), recorded, interrupted, |_| ())?;
+    Ok(())
+}
+
+/// Takes the end of the standard input for an interrupt: so no case outlives the sweep it is of.
+fn watch_input(interrupted: &Arc<AtomicBool>) -> Result<(), Failure> {
+    let flag = interrupted.clone();
+    let watch = move || {
+        // Nothing is written there; it returns at the end, or when it cannot be read.
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        flag.store(true, Ordering::SeqCst);
+    };
+    match std::thread::Builder::new().name("input".into()).spawn(watch) {
+        Ok(_) => Ok(()),
+        Err(e) => Err(Failure::Environment(format!("a thread cannot be started: {e}"))),
+    }
+}
+
+fn show_list(store: &Store, missing: bool) -> Result<(), Failure> {
+    let (list, _) = store.read()?;
+    let line = |case: &Case| {
+        let state = store.state(&case.id);
+        if missing {
+            return (state != State::Done).then(|| case.id.clone());
+        }
+        let state = match state {
+            State::Done => "done".to_owned(),
+            State::Failed(cause) => format!("failed: {cause}"),
+            State::Missing => "missing".to_owned(),
+        };
+        Some(format!("{:>5}  {}  {}  {state}", case.number, case.id, case.label()))
+    };
+    let lines: Vec<String> = list.cases.iter().filter_map(line).collect();
+    if lines.is_empty() { Ok(()) } else { print(&lines.join("\n")) }
+}
+
+/// What would run, and what it needs.
+fn plan_text(open: &[&Case], args: &Args) -> String {
+    let mut lines: Vec<String> = open
+        .iter()
+        .map(|c| {
+            format!(
+                "{:>5}  {}  {}  ({} unknowns, at most {} MB)",
+                c.number,
+                c.id,
+                c.label(),
+                c.unknowns,
+                c.memory / 1_000_000
+            )
+        })
+        .collect();
+    let limits = Limits::of_machine(args.jobs.map(|n| n as usize), args.cores as usize);
+    let on = match args.engine {
+        EngineName::Local => format!(
+            "on this machine up to {} at once, {} thread(s) each, in {} MB of memory",
+            limits.jobs,
+            limits.threads,
+            limits.memory / 1_000_000
+        ),
+        EngineName::Hq => format!("as tasks of HyperQueue, {} core(s) each", limits.threads),
+    };
+    lines.push(format!("{} cases would run, {on}", open.len()));
+    lines.join("\n")
+}
+
+/// Tables, plots and, if asked for, a recording side by side: of the cases named, or of all of the
+/// first seed.
+fn collect(store: &Store, list: &List, side_by_side: Option<&[String]>) -> Result<(), Failure> {
+    let found = Collection::new(store, list)?;
+    let mut files = found.write_tables(store.root())?;
+    for stem in found.plot(store.root(), &list.spec.plots)? {
+        let mut name = stem.into_os_string();
+        name.push(".svg, .png");
+        files.push(name.into());
+    }
+    let mut text = found.terminal();
+    text += &format!("\n{} of {} cases are done\n", found.done(), list.cases.len());
+    if let Some(named) = side_by_side {
+        let cases =
+            if named.is_empty() { of_first_seed(store, list) } else { chosen(list, named)? };
+        if cases.len() > 1 {
+            files.push(beside(store, &cases)?);
+        }
+    }
+    for file in files {
+        text += &format!("wrote {}\n", file.display());
+    }
+    print(&text)
+}
+
+fn chosen<'a>(list: &'a List, named: &[String]) -> Result<Vec<&'a Case>, Failure> {
+    Ok(named.iter().map(|name| list.case(name)).collect::<Result<_, _>>()?)
+}
+
+fn of_first_seed<'a>(store: &Store, list: &'a List) -> Vec<&'a Case> {
+    let first = list.cases.first().and_then(|c| c.seed);
+    let done = list.cases.iter().filter(|c| c.seed == first && store.state(&c.id) == State::Done);
+    done.take(MOST_SIDE_BY_SIDE).collect()
+}
+
+/// One recording and plots of some cases, compared with the first of them.
+fn beside(store: &Store, cases: &[&Case]) -> Result<PathBuf, Failure> {
+    let folders: Vec<PathBuf> = cases.iter().map(|c| store.done(&c.id)).collect();
+    let mut members = compare::open_all(&folders)?;
+    for (member, case) in members.iter_mut().zip(cases) {
+        member.rename(&case.label());
+    }
+    let path = store.root().join("side_by_side.rrd");
+    let found = compare::compare(&members, &[])?;
+    comparison::write(found, &members, &path, &[Sink::Save(path.clone())])?;
+    Ok(path)
+}

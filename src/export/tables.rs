@@ -1,0 +1,47 @@
+//! Tables: a row for each particle, and for each sample of the fields.
+
+use super::{ExportError, Film, Instant, write_file};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Writes `particles_<n>.csv`, `fields_<n>.csv` and `frames.csv`, which has their times.
+pub(super) fn write(film: &Film, folder: &Path) -> Result<usize, ExportError> {
+    let mut frames = String::from("frame,time\n");
+    let mut files = 1;
+    for (n, instant) in film.instants.iter().enumerate() {
+        let _ = writeln!(frames, "{n},{}", instant.time_s);
+        let both = [("particles", particles(instant, film)), ("fields", fields(instant))];
+        for (name, text) in both.into_iter().filter_map(|(name, text)| Some((name, text?))) {
+            write_file(folder.join(format!("{name}_{n:05}.csv")), text)?;
+            files += 1;
+        }
+    }
+    write_file(folder.join("frames.csv"), frames)?;
+    Ok(files)
+}
+
+// Writing to a string cannot fail.
+fn particles(instant: &Instant, film: &Film) -> Option<String> {
+    let particles = instant.particles.as_ref()?;
+    let mut text = String::from("x,y,material\n");
+    for ([x, y], class) in particles.positions.iter().zip(&particles.class) {
+        let name = film.materials.get(usize::from(*class)).map_or("", String::as_str);
+        let _ = writeln!(text, "{x},{y},{name}");
+    }
+    Some(text)
+}
+
+fn fields(instant: &Instant) -> Option<String> {
+    let first = instant.fields.first()?;
+    let names: Vec<&str> = instant.fields.iter().map(|f| f.name.as_str()).collect();
+    let mut text = format!("x,y,{}\n", names.join(","));
+    for k in 0..first.nx * first.ny {
+        let centre = |c: usize, i: usize| first.origin[c] + (i as f32 + 0.5) * first.cell[c];
+        let _ = write!(text, "{},{}", centre(0, k % first.nx), centre(1, k / first.nx));
+        for field in &instant.fields {
+            let _ = write!(text, ",{}", field.values[k]);
+        }
+        text.push('\n');
+    }
+    Some(text)
+}

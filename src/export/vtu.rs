@@ -1,0 +1,128 @@
+//! VTK's unstructured grids (XML, numbers in base64), and the series of them that ParaView opens.
+
+use super::{ExportError, Film, Instant, write_file};
+use crate::frame::{GridField, ParticleSnapshot};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use std::path::Path;
+
+/// VTK's numbers for kinds of cells.
+const VERTEX: u8 = 1;
+const QUAD: u8 = 9;
+
+/// Cells with numbers at their points or on them.
+#[derive(Default)]
+struct Grid {
+    points: Vec<[f32; 2]>,
+    /// Points of each cell; all have as many.
+    cells: Vec<i64>,
+    points_per_cell: usize,
+    kind: u8,
+    point_data: String,
+    cell_data: String,
+}
+
+/// Writes `particles_<n>.vtu`, `fields_<n>.vtu`, and for each a `.pvd` with their times.
+pub(super) fn write(film: &Film, folder: &Path) -> Result<usize, ExportError> {
+    let particles = |i: &Instant| i.particles.as_ref().map(particles);
+    let fields = |i: &Instant| (!i.fields.is_empty()).then(|| fields(&i.fields));
+    let numbered = film.materials.iter().enumerate();
+    let names: String = numbered.map(|(n, name)| format!("{n},{name}\n")).collect();
+    write_file(folder.join("materials.csv"), format!("number,name\n{names}"))?;
+    Ok(1 + series(film, folder, "particles", particles)? + series(film, folder, "fields", fields)?)
+}
+
+fn series(
+    film: &Film,
+    folder: &Path,
+    name: &str,
+    grid: impl Fn(&Instant) -> Option<Grid>,
+) -> Result<usize, ExportError> {
+    let mut sets = String::new();
+    let mut files = 0;
+    for (n, instant) in film.instants.iter().enumerate() {
+        let Some(grid) = grid(instant) else { continue };
+        let file = format!("{name}_{n:05}.vtu");
+        sets +=
+            &format!("    <DataSet timestep=\"{}\" part=\"0\" file=\"{file}\"/>\n", instant.time_s);
+        write_file(folder.join(file), grid.xml())?;
+        files += 1;
+    }
+    if files == 0 {
+        return Ok(0);
+    }
+    let text = format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" \
+         byte_order=\"LittleEndian\">\n  <Collection>\n{sets}  </Collection>\n</VTKFile>\n"
+    );
+    write_file(folder.join(format!("{name}.pvd")), text)?;
+    Ok(files + 1)
+}
+
+fn particles(particles: &ParticleSnapshot) -> Grid {
+    let class = particles.class.iter().flat_map(|c| i32::from(*c).to_le_bytes()).collect();
+    Grid {
+        points: particles.positions.clone(),
+        cells: (0..particles.positions.len() as i64).collect(),
+        points_per_cell: 1,
+        kind: VERTEX,
+        point_data: array("material", "Int32", 1, class),
+        ..Grid::default()
+    }
+}
+
+fn fields(fields: &[GridField]) -> Grid {
+    let GridField { origin, cell, nx, ny, .. } = fields[0];
+    let corner =
+        |i: usize, j: usize| [origin[0] + i as f32 * cell[0], origin[1] + j as f32 * cell[1]];
+    let number = |i: usize, j: usize| (j * (nx + 1) + i) as i64;
+    let corners = (0..=ny).flat_map(|j| (0..=nx).map(move |i| corner(i, j)));
+    let quads = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j)));
+    let around = |(i, j)| [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+    let data = |f: &GridField| {
+        array(&f.name, "Float32", 1, f.values.iter().flat_map(|v| v.to_le_bytes()).collect())
+    };
+    Grid {
+        points: corners.collect(),
+        cells: quads.flat_map(around).collect(),
+        points_per_cell: 4,
+        kind: QUAD,
+        cell_data: fields.iter().map(data).collect(),
+        ..Grid::default()
+    }
+}
+
+/// An array of numbers, behind their length as VTK wants it.
+fn array(name: &str, kind: &str, components: usize, bytes: Vec<u8>) -> String {
+    let mut block = (bytes.len() as u64).to_le_bytes().to_vec();
+    block.extend(bytes);
+    let name = name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
+    format!(
+        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" \
+         format=\"binary\">{}</DataArray>\n",
+        STANDARD.encode(block)
+    )
+}
+
+impl Grid {
+    fn xml(&self) -> String {
+        let count = self.cells.len() / self.points_per_cell.max(1);
+        let points = self.points.iter().flat_map(|p| [p[0], p[1], 0.0]);
+        let points = array("Points", "Float32", 3, points.flat_map(f32::to_le_bytes).collect());
+        let cells = self.cells.iter().flat_map(|p| p.to_le_bytes()).collect();
+        let ends = (1..=count).flat_map(|n| ((n * self.points_per_cell) as i64).to_le_bytes());
+        format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" \
+             byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece \
+             NumberOfPoints=\"{}\" NumberOfCells=\"{count}\">\n<PointData>\n{}</PointData>\n\
+             <CellData>\n{}</CellData>\n<Points>\n{points}</Points>\n<Cells>\n{}{}{}</Cells>\n\
+             </Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+            self.points.len(),
+            self.point_data,
+            self.cell_data,
+            array("connectivity", "Int64", 1, cells),
+            array("offsets", "Int64", 1, ends.collect()),
+            array("types", "UInt8", 1, vec![self.kind; count]),
+        )
+    }
+}

@@ -1,0 +1,188 @@
+//! The local engine: processes of this program, as many as the machine holds.
+
+use super::{Case, Engine, Event, State, SweepError, THREADS, Work};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// How often children are looked after.
+const POLL: Duration = Duration::from_millis(50);
+/// How often the share that is done is read from the folders.
+const REPORT: Duration = Duration::from_millis(500);
+/// How long interrupted children may finish their step.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Share of the free memory that cases may take.
+const MEMORY_SHARE: f64 = 0.8;
+/// Lines of a failed child's words that are kept.
+const LAST_WORDS: usize = 400;
+
+/// What a machine gives to a sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Most cases at once.
+    pub jobs: usize,
+    /// Threads of each.
+    pub threads: usize,
+    /// Bytes for all that run.
+    pub memory: u64,
+}
+
+impl Limits {
+    /// All cores and most of the free memory of this machine.
+    pub fn of_machine(jobs: Option<usize>, threads: usize) -> Limits {
+        let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+        let mut system = sysinfo::System::new();
+        system.refresh_memory();
+        let free = system.available_memory();
+        // In a container the machine's memory is not all ours; files it has cached count as free.
+        let limit = |c: sysinfo::CGroupLimits| free.min(c.total_memory.saturating_sub(c.rss));
+        let ours = system.cgroup_limits().map_or(free, limit);
+        Limits {
+            jobs: jobs.unwrap_or((cores / threads.max(1)).max(1)),
+            threads,
+            memory: (MEMORY_SHARE * ours as f64) as u64,
+        }
+    }
+
+    /// Whether a case fits beside what runs; one alone always does.
+    fn admits(&self, running: &[u64], next: u64) -> bool {
+        let taken: u64 = running.iter().sum();
+        running.is_empty() || running.len() < self.jobs && taken + next <= self.memory
+    }
+}
+
+/// Runs cases on this machine.
+pub struct Local {
+    /// This program.
+    pub program: PathBuf,
+    pub limits: Limits,
+}
+
+struct Running<'a> {
+    case: &'a Case,
+    child: Child,
+}
+
+impl Engine for Local {
+    fn run(&self, work: &mut Work) -> Result<(), SweepError> {
+        let cases = work.cases.clone();
+        let mut waiting = cases.iter().copied();
+        let mut next = waiting.next();
+        let mut running: Vec<Running> = vec![];
+        let mut ended = 0;
+        let mut told = Instant::now();
+        while !running.is_empty() || next.is_some() {
+            if work.is_interrupted() {
+                stop(&mut running);
+                return Ok(());
+            }
+            let taken: Vec<u64> = running.iter().map(|r| r.case.memory).collect();
+            if let Some(case) = next.filter(|case| self.limits.admits(&taken, case.memory)) {
+                running.push(self.start(work, case)?);
+                (work.watch)(Event::Started(case));
+                next = waiting.next();
+                continue;
+            }
+            let mut k = 0;
+            while k < running.len() {
+                match running[k].child.try_wait() {
+                    Ok(None) => k += 1,
+                    Ok(Some(status)) => {
+                        let Running { case, child } = running.swap_remove(k);
+                        ended += 1;
+                        settle(work, case, status, child)?;
+                    }
+                    Err(e) => {
+                        stop(&mut running);
+                        return Err(SweepError::Engine(format!("a case cannot be awaited: {e}")));
+                    }
+                }
+            }
+            if told.elapsed() > REPORT {
+                told = Instant::now();
+                let begun: f64 = running.iter().map(|r| work.store.progress(r.case)).sum();
+                let share = (ended as f64 + begun) / cases.len().max(1) as f64;
+                (work.watch)(Event::Progress { share, running: running.len() });
+            }
+            std::thread::sleep(POLL);
+        }
+        Ok(())
+    }
+}
+
+impl Local {
+    fn start<'a>(&self, work: &Work, case: &'a Case) -> Result<Running<'a>, SweepError> {
+        let mut command = Command::new(&self.program);
+        command
+            .args(["sweep", "case", "--stop-with-input"])
+            .arg(work.store.root())
+            .arg(&case.id)
+            .env(THREADS, self.limits.threads.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        // Ctrl-C is for this process, which tells the others.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let child = command.spawn().map_err(|e| {
+            SweepError::Engine(format!("cannot start {}: {e}", self.program.display()))
+        })?;
+        Ok(Running { case, child })
+    }
+}
+
+/// Finds out what has become of a case whose process has ended.
+fn settle(
+    work: &mut Work,
+    case: &Case,
+    status: ExitStatus,
+    mut child: Child,
+) -> Result<(), SweepError> {
+    if !status.success() && work.store.state(&case.id) == State::Missing {
+        let mut words = vec![];
+        if let Some(mut stderr) = child.stderr.take() {
+            // What it said is a help only.
+            let _ = std::io::Read::read_to_end(&mut stderr, &mut words);
+        }
+        let words = String::from_utf8_lossy(&words);
+        let words: Vec<&str> = words.split_whitespace().collect();
+        let last = words[words.len().saturating_sub(LAST_WORDS)..].join(" ");
+        work.store.blame(
+            &case.id,
+            format!("its process ended with {status}; {last}").trim_end_matches("; "),
+        )?;
+    }
+    (work.watch)(Event::Ended(case, work.store.state(&case.id)));
+    Ok(())
+}
+
+/// Lets children finish their step; those that take long are ended.
+fn stop(running: &mut [Running]) {
+    // The end of its input tells a case to end.
+    running.iter_mut().for_each(|r| drop(r.child.stdin.take()));
+    let start = Instant::now();
+    for r in running {
+        while start.elapsed() < PATIENCE && matches!(r.child.try_wait(), Ok(None)) {
+            std::thread::sleep(POLL);
+        }
+        // Those that have ended cannot be killed.
+        let _ = r.child.kill();
+        let _ = r.child.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_and_cores_limit_what_runs_at_once() {
+        let limits = Limits { jobs: 3, threads: 1, memory: 100 };
+        assert!(limits.admits(&[], 1000), "a large case runs alone");
+        assert!(limits.admits(&[50], 50) && !limits.admits(&[50], 51));
+        assert!(limits.admits(&[1, 1], 1) && !limits.admits(&[1, 1, 1], 1));
+        let all = Limits::of_machine(None, 1);
+        assert!(all.jobs >= 1 && all.memory > 1_000_000);
+        assert_eq!(Limits::of_machine(None, 1 << 20).jobs, 1);
+    }
+}

@@ -1,0 +1,184 @@
+//! What a sweep is: a scene, what varies in it, and what is plotted of it.
+
+use super::{Sample, SweepError};
+use crate::scene::{SceneError, closest};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Version of sweep files.
+const SCHEMA: u32 = 1;
+
+/// Sweeps that come with the program.
+const PRESETS: [(&str, &str); 5] = [
+    ("fig3", include_str!("../../presets/sweeps/fig3.toml")),
+    ("discharge", include_str!("../../presets/sweeps/discharge.toml")),
+    ("texture", include_str!("../../presets/sweeps/texture.toml")),
+    ("opening", include_str!("../../presets/sweeps/opening.toml")),
+    ("cost_of_size", include_str!("../../presets/sweeps/cost_of_size.toml")),
+];
+
+/// A sweep, from a file or the command line.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spec {
+    #[serde(default)]
+    pub schema: u32,
+    pub name: String,
+    #[serde(default)]
+    pub description: String,
+    /// Preset name or path of the scene.
+    pub scene: String,
+    /// Settings of all cases, as `--set` takes them.
+    #[serde(default)]
+    pub set: Vec<String>,
+    /// What varies, as `--vary` takes it.
+    #[serde(default)]
+    pub vary: Vec<String>,
+    /// As `--sample` takes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample: Option<String>,
+    /// As `--repeat-seeds` takes it.
+    #[serde(default = "one")]
+    pub repeat_seeds: u32,
+    /// Whether cases leave recordings.
+    #[serde(default = "yes")]
+    pub recordings: bool,
+    /// Whether all cases of the first seed are put side by side at the end.
+    #[serde(default)]
+    pub side_by_side: bool,
+    /// Settings that make it coarse and short.
+    #[serde(default)]
+    pub quick: Quick,
+    #[serde(default)]
+    pub plots: Vec<PlotSpec>,
+}
+
+/// What `--quick` changes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quick {
+    #[serde(default)]
+    pub set: Vec<String>,
+    /// Instead of the others.
+    #[serde(default)]
+    pub vary: Vec<String>,
+    #[serde(default)]
+    pub repeat_seeds: Option<u32>,
+}
+
+/// A quantity against a parameter; a curve for each value of the other parameters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlotSpec {
+    #[serde(default)]
+    pub title: String,
+    /// A column of the table.
+    pub x: String,
+    pub y: String,
+    #[serde(default)]
+    pub log_x: bool,
+    #[serde(default)]
+    pub log_y: bool,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl Spec {
+    /// The sweep, coarse and short.
+    pub fn quick(mut self) -> Spec {
+        self.set.append(&mut self.quick.set);
+        if !self.quick.vary.is_empty() {
+            self.vary = std::mem::take(&mut self.quick.vary);
+        }
+        self.repeat_seeds = self.quick.repeat_seeds.unwrap_or(self.repeat_seeds);
+        self
+    }
+
+    /// How ranges are sampled.
+    pub fn sampling(&self) -> Result<Option<Sample>, SweepError> {
+        let read = |text: &String| {
+            text.parse().map_err(|e| SweepError::Usage(format!("--sample {text}: {e}")))
+        };
+        self.sample.as_ref().map(read).transpose()
+    }
+}
+
+/// Names and descriptions of the sweeps that come with the program.
+pub fn preset_list() -> Vec<(&'static str, String)> {
+    let described =
+        |(name, text): (&'static str, &str)| Some((name, read(name, text).ok()?.description));
+    PRESETS.into_iter().filter_map(described).collect()
+}
+
+/// The text of the sweep of a name.
+pub fn preset_source(name: &str) -> Option<&'static str> {
+    PRESETS.iter().find(|preset| preset.0 == name).map(|preset| preset.1)
+}
+
+/// Finds a sweep by preset name or path; `None` if it is neither, and so perhaps a scene.
+pub fn read_file(name: &str) -> Result<Option<Spec>, SweepError> {
+    if let Some(text) = preset_source(name) {
+        return read(name, text).map(Some);
+    }
+    let path = Path::new(name);
+    if path.extension().is_none_or(|e| e != "toml") || !path.is_file() {
+        return Ok(None);
+    }
+    // What cannot be read as text or TOML is for the reader of scenes to complain of.
+    let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
+    let is_sweep = toml::from_str::<toml::Table>(&text).is_ok_and(|t| t.contains_key("vary"));
+    is_sweep.then(|| read(name, &text)).transpose()
+}
+
+fn read(name: &str, text: &str) -> Result<Spec, SweepError> {
+    let broken = |message: String, help: &str| {
+        SweepError::Scene(SceneError::new(format!("the sweep {name}: {message}"), help))
+    };
+    let spec: Spec = toml::from_str(text).map_err(|e| {
+        let help = "grainscope sweep presets fig3 shows one that is right";
+        broken(e.to_string().trim_end().to_owned(), help)
+    })?;
+    if spec.schema != SCHEMA {
+        let help = format!("write schema = {SCHEMA}");
+        return Err(broken(format!("schema {} is not known", spec.schema), &help));
+    }
+    Ok(spec)
+}
+
+/// The sweep of a similar name, to be proposed.
+pub fn similar(name: &str) -> Option<&'static str> {
+    closest(name, PRESETS.iter().map(|p| p.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::presets;
+    use crate::sweep::List;
+
+    #[test]
+    fn presets_make_lists_of_cases() {
+        for (name, text) in PRESETS {
+            let spec = read(name, text).expect(name);
+            assert_eq!(spec.name, name);
+            assert!(!spec.description.is_empty() && !spec.plots.is_empty(), "{name}");
+            let source = presets::find(&spec.scene).expect(name);
+            let whole = List::new(&source, &spec).expect(name);
+            let quick = List::new(&source, &spec.clone().quick()).expect(name);
+            assert!(quick.cases.len() >= 2 && quick.cases.len() <= whole.cases.len(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_broken_file_says_where() {
+        let said = read("s", "schema = 1\nname = \"s\"\nscen = \"silo\"").expect_err("a typo");
+        assert!(said.to_string().contains("unknown field `scen`"), "{said}");
+        assert!(read("s", "schema = 2\nname = \"s\"\nscene = \"silo\"").is_err());
+    }
+}

@@ -1,0 +1,350 @@
+//! The folder of a sweep, and what is done in it.
+//!
+//!     cases.json scene.toml     what is to be run
+//!     cases/<id>                finished runs: they appear whole, by one renaming
+//!     failed/<id>               what a failed run has left, with its cause
+//!     running/<id>              runs in the making, each under a lock
+
+use super::{Case, List, SweepError};
+use crate::scene::SceneSource;
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File, TryLockError};
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// File of a case beside those of its run.
+const NOTE: &str = "case.json";
+
+/// The folder of a sweep.
+#[derive(Clone, Debug)]
+pub struct Store {
+    root: PathBuf,
+}
+
+/// What has become of a case.
+#[derive(Clone, Debug, PartialEq)]
+pub enum State {
+    Done,
+    Failed(String),
+    Missing,
+}
+
+/// What is known of a case beyond its run's summary.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Note {
+    pub id: String,
+    #[serde(default)]
+    pub cause: Option<String>,
+    /// Most memory that its process held, bytes; where the system says it.
+    #[serde(default)]
+    pub peak_memory: Option<u64>,
+}
+
+impl Store {
+    pub fn new(root: &Path) -> Store {
+        Store { root: root.to_owned() }
+    }
+
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The folder of a finished case.
+    pub fn done(&self, id: &str) -> PathBuf {
+        self.root.join("cases").join(id)
+    }
+
+    /// The folder of a case that failed.
+    pub fn failed(&self, id: &str) -> PathBuf {
+        self.root.join("failed").join(id)
+    }
+
+    fn running(&self, id: &str) -> PathBuf {
+        self.root.join("running").join(id)
+    }
+
+    /// Writes down what is to be run.
+    pub fn write(&self, list: &List, source: &SceneSource) -> Result<(), SweepError> {
+        fs::create_dir_all(&self.root).map_err(SweepError::file("make", &self.root))?;
+        let json = serde_json::to_string_pretty(list)
+            .map_err(|e| SweepError::Broken { path: self.cases(), cause: e.to_string() })?;
+        replace(&self.scene(), source.text())?;
+        replace(&self.cases(), &format!("{json}\n"))
+    }
+
+    /// Reads what is to be run, and the scene of the sweep.
+    pub fn read(&self) -> Result<(List, SceneSource), SweepError> {
+        let path = self.cases();
+        if !path.is_file() {
+            return Err(SweepError::Usage(format!(
+                "{}: holds no sweep; expected a folder with {}, as `grainscope sweep <scene> --vary \
+                 ... --out DIR` leaves it",
+                self.root.display(),
+                self.cases().file_name().unwrap_or_default().to_string_lossy()
+            )));
+        }
+        let text = fs::read_to_string(&path).map_err(SweepError::file("read", &path))?;
+        let list = serde_json::from_str(&text)
+            .map_err(|e| SweepError::Broken { path, cause: format!("is no list of cases: {e}") })?;
+        let scene = self.scene();
+        let text = fs::read_to_string(&scene).map_err(SweepError::file("read", &scene))?;
+        Ok((list, SceneSource::new(scene.display().to_string(), text)))
+    }
+
+    fn cases(&self) -> PathBuf {
+        self.root.join("cases.json")
+    }
+
+    fn scene(&self) -> PathBuf {
+        self.root.join("scene.toml")
+    }
+
+    pub fn state(&self, id: &str) -> State {
+        if self.done(id).join("summary.json").is_file() {
+            State::Done
+        } else if self.failed(id).is_dir() {
+            let cause = self.note(&self.failed(id)).cause;
+            State::Failed(cause.unwrap_or_else(|| "its cause was not written down".into()))
+        } else {
+            State::Missing
+        }
+    }
+
+    /// What is known of a case from its folder.
+    pub fn note(&self, folder: &Path) -> Note {
+        let text = fs::read_to_string(folder.join(NOTE)).unwrap_or_default();
+        serde_json::from_str(&text).unwrap_or_default()
+    }
+
+    /// Finished runs that are not of the list.
+    pub fn strangers(&self, list: &List) -> usize {
+        let Ok(entries) = fs::read_dir(self.root.join("cases")) else { return 0 };
+        let name = |e: std::io::Result<fs::DirEntry>| e.ok()?.file_name().into_string().ok();
+        entries.filter_map(name).filter(|n| list.cases.iter().all(|c| c.id != *n)).count()
+    }
+
+    /// Starts on a case: waits for whoever else is at it; `None` if that one has finished it.
+    pub fn begin(&self, id: &str) -> Result<Option<Attempt>, SweepError> {
+        if self.state(id) == State::Done {
+            return Ok(None);
+        }
+        let running = self.root.join("running");
+        fs::create_dir_all(&running).map_err(SweepError::file("make", &running))?;
+        let path = running.join(format!("{id}.lock"));
+        let lock = File::create(&path).map_err(SweepError::file("write", &path))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                eprintln!("case {id} runs elsewhere; waiting for it");
+                lock.lock().map_err(SweepError::file("lock", &path))?;
+            }
+            // A file system without locks: what is lost is a guard against doing things twice.
+            Err(TryLockError::Error(e)) => {
+                eprintln!("warning: {} has no lock: {e}", path.display())
+            }
+        }
+        if self.state(id) == State::Done {
+            // It is the one that we have waited for.
+            let _ = fs::remove_file(&path);
+            return Ok(None);
+        }
+        let folder = self.running(id);
+        remove(&folder)?;
+        fs::create_dir_all(&folder).map_err(SweepError::file("make", &folder))?;
+        Ok(Some(Attempt { store: self.clone(), id: id.to_owned(), folder, _lock: lock }))
+    }
+
+    /// Writes down a failure of a case whose process is gone without a word.
+    pub fn blame(&self, id: &str, cause: &str) -> Result<(), SweepError> {
+        let (from, to) = (self.running(id), self.failed(id));
+        fs::create_dir_all(&from).map_err(SweepError::file("make", &from))?;
+        self.shelve(id, &from, &to, Some(cause), None)
+    }
+
+    /// Share of a case that is computed, by the last row of its series.
+    pub fn progress(&self, case: &Case) -> f64 {
+        match self.state(&case.id) {
+            State::Done | State::Failed(_) => 1.0,
+            State::Missing => {
+                let time = last_time(&self.running(&case.id).join("series.csv"));
+                (time.unwrap_or(0.0) / case.end).clamp(0.0, 1.0)
+            }
+        }
+    }
+
+    fn shelve(
+        &self,
+        id: &str,
+        from: &Path,
+        to: &Path,
+        cause: Option<&str>,
+        peak_memory: Option<u64>,
+    ) -> Result<(), SweepError> {
+        let note = Note { id: id.to_owned(), cause: cause.map(String::from), peak_memory };
+        let json = serde_json::to_string_pretty(&note).unwrap_or_default();
+        let path = from.join(NOTE);
+        fs::write(&path, format!("{json}\n")).map_err(SweepError::file("write", &path))?;
+        correct_paths(from, to);
+        if let Some(parent) = to.parent() {
+            fs::create_dir_all(parent).map_err(SweepError::file("make", parent))?;
+        }
+        remove(to)?;
+        fs::rename(from, to).map_err(SweepError::file("move a run to", to))
+    }
+}
+
+/// A case that is being run, by this process alone.
+pub struct Attempt {
+    store: Store,
+    id: String,
+    folder: PathBuf,
+    _lock: File,
+}
+
+impl Attempt {
+    /// Where the run is made.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Puts the finished run in its place.
+    pub fn finish(self) -> Result<(), SweepError> {
+        let to = self.store.done(&self.id);
+        self.store.shelve(&self.id, &self.folder, &to, None, peak_memory())?;
+        remove(&self.store.failed(&self.id))?;
+        self.unlock();
+        Ok(())
+    }
+
+    /// Keeps what the failed run has left, and why it failed.
+    pub fn fail(self, cause: &str) -> Result<(), SweepError> {
+        let to = self.store.failed(&self.id);
+        self.store.shelve(&self.id, &self.folder, &to, Some(cause), peak_memory())?;
+        self.unlock();
+        Ok(())
+    }
+
+    /// Forgets the run.
+    pub fn abandon(self) {
+        // Best effort: the next try begins with it.
+        let _ = remove(&self.folder);
+        self.unlock();
+    }
+
+    fn unlock(self) {
+        // A file that stays is locked anew by the next one.
+        let _ = fs::remove_file(self.store.root.join("running").join(format!("{}.lock", self.id)));
+    }
+}
+
+/// Most memory that this process has held, bytes; where the system says it.
+pub fn peak_memory() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    Some(1024 * line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
+}
+
+/// The summary names the places where things are, not those where they were made.
+fn correct_paths(from: &Path, to: &Path) {
+    let path = from.join("summary.json");
+    let Ok(text) = fs::read_to_string(&path) else { return };
+    let Ok(mut summary) = serde_json::from_str::<serde_json::Value>(&text) else { return };
+    for key in ["folder", "recording"] {
+        let Some(serde_json::Value::String(place)) = summary.get_mut(key) else { continue };
+        if let Ok(below) = Path::new(place).strip_prefix(from) {
+            let moved = if below.as_os_str().is_empty() { to.to_owned() } else { to.join(below) };
+            *place = moved.display().to_string();
+        }
+    }
+    let json = serde_json::to_string_pretty(&summary).unwrap_or(text);
+    // The old one is right but for two paths.
+    let _ = fs::write(&path, format!("{json}\n"));
+}
+
+fn remove(folder: &Path) -> Result<(), SweepError> {
+    match fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(SweepError::file("remove", folder)(e))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a file so that readers see the old one or the new one.
+fn replace(path: &Path, text: &str) -> Result<(), SweepError> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(format!(".{}", std::process::id()));
+    let beside = PathBuf::from(beside);
+    fs::write(&beside, text).map_err(SweepError::file("write", &beside))?;
+    fs::rename(&beside, path).map_err(SweepError::file("write", path))
+}
+
+/// The time of the last whole row of a series.
+fn last_time(path: &Path) -> Option<f64> {
+    const TAIL: u64 = 4096;
+    let mut file = File::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL))).ok()?;
+    let mut bytes = vec![];
+    file.read_to_end(&mut bytes).ok()?;
+    let text = String::from_utf8_lossy(&bytes);
+    let whole = &text[..text.rfind('\n')?];
+    whole.lines().last()?.split(',').nth(1)?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::TempFolder;
+
+    #[test]
+    fn cases_appear_whole_or_not_at_all() {
+        let here = TempFolder::new().expect("a folder");
+        let store = Store::new(here.path());
+        let attempt = store.begin("a").expect("begins").expect("not done");
+        let written = attempt.folder().join("summary.json");
+        let place = attempt.folder().join("recording.rrd").display().to_string();
+        fs::write(&written, serde_json::json!({ "recording": place }).to_string()).expect("a file");
+        fs::write(attempt.folder().join("series.csv"), "step,time\n0,0\n1,0.5\n2,0.7")
+            .expect("a file");
+        assert_eq!(last_time(&attempt.folder().join("series.csv")), Some(0.5));
+        assert_eq!(store.state("a"), State::Missing);
+        attempt.finish().expect("moved");
+        assert_eq!(store.state("a"), State::Done);
+        let summary = fs::read_to_string(store.done("a").join("summary.json")).expect("there");
+        assert!(summary.contains(&store.done("a").join("recording.rrd").display().to_string()));
+        assert!(store.begin("a").expect("asks").is_none());
+        assert_eq!(fs::read_dir(here.path().join("running")).expect("there").count(), 0);
+    }
+
+    #[test]
+    fn failures_keep_their_cause_until_they_are_mended() {
+        let here = TempFolder::new().expect("a folder");
+        let store = Store::new(here.path());
+        store.begin("a").expect("begins").expect("not done").fail("too stiff").expect("moved");
+        assert_eq!(store.state("a"), State::Failed("too stiff".into()));
+        let attempt = store.begin("a").expect("begins").expect("not done");
+        fs::write(attempt.folder().join("summary.json"), "{}").expect("a file");
+        attempt.finish().expect("moved");
+        assert_eq!(store.state("a"), State::Done);
+        assert!(!store.failed("a").exists());
+        store.blame("b", "killed").expect("written");
+        assert_eq!(store.state("b"), State::Failed("killed".into()));
+    }
+
+    #[test]
+    fn two_never_run_one_case() {
+        let here = TempFolder::new().expect("a folder");
+        let store = Store::new(here.path());
+        let first = store.begin("a").expect("begins").expect("not done");
+        let second = {
+            let store = store.clone();
+            std::thread::spawn(move || store.begin("a").expect("asks").is_none())
+        };
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        assert!(!second.is_finished());
+        fs::write(first.folder().join("summary.json"), "{}").expect("a file");
+        first.finish().expect("moved");
+        assert!(second.join().expect("no panic"), "it was done twice");
+    }
+}
