@@ -47,6 +47,7 @@ pub mod plan;
 pub mod record;
 pub mod scene;
 pub mod sim;
+pub mod simd;
 pub mod solve;
 pub mod space;
 pub mod stress;

@@ -51,8 +51,9 @@ pub fn advance(
     threads::for_parts(members, 0..mesh.cells(), CELL_GRAIN, |cells, members| {
         let first = members.start[0] as usize;
         for cell in cells {
-            for p in particles.of_cell(cell) {
-                let journey = carrier.travel(cell, particles.position[p]);
+            let range = particles.of_cell(cell);
+            carrier.travel_all(cell, &particles.position[range.clone()], |k, journey| {
+                let p = range.start + k;
                 let moved = &mut members.moved[p - first];
                 (moved.to, moved.left, moved.held) = (journey.to, journey.left, journey.held);
                 if turning {
@@ -64,7 +65,7 @@ pub fn advance(
                         moved.stretch = (l.trace() * carrier.dt).exp();
                     }
                 }
-            }
+            });
         }
     });
     for gauge in gauges {

@@ -1,7 +1,8 @@
 //! Transport of points through the velocity of the half step: second order in time.
 
-use super::current::Current;
+use super::current::{Current, Points, TOGETHER, ways};
 use crate::laws::director;
+use crate::simd::Simd;
 use crate::space::mesh::Mesh;
 use crate::space::walls::{Enclosure, Landing};
 use crate::threads;
@@ -17,6 +18,7 @@ pub struct Carrier<'a> {
     pub dt: f64,
     /// Of every cell, at the middle of the step.
     currents: Vec<Current>,
+    simd: Simd,
 }
 
 /// Where a point goes in a step.
@@ -39,7 +41,7 @@ impl<'a> Carrier<'a> {
             let nodal = mesh.cell_nodes(cell).map(|n| velocity[n]);
             *current = Current::new(&nodal, mesh.cell_size(cell));
         });
-        Carrier { mesh, enclosure, dt, currents }
+        Carrier { mesh, enclosure, dt, currents, simd: Simd::detect() }
     }
 
     /// Velocity at a place reached from `p`, walls and periodic sides respected, and where it
@@ -89,6 +91,38 @@ impl<'a> Carrier<'a> {
             Landing::Left => (goal, true, false),
         };
         Journey { to, left, held, middle }
+    }
+
+    /// The ways of the points of one cell: those that stay inside it together, the others one by one.
+    pub fn travel_all(
+        &self,
+        cell: usize,
+        from: &[[f64; 2]],
+        mut arrive: impl FnMut(usize, Journey),
+    ) {
+        let (mesh, dt) = (self.mesh, self.dt);
+        let centre = mesh.cell_centre(cell);
+        let per_length = mesh.cell_size(cell).map(|h| 2.0 / h);
+        for (at, points) in from.chunks(TOGETHER).enumerate() {
+            let mut r: Points = [[0.0; TOGETHER]; 2];
+            for (k, p) in points.iter().enumerate() {
+                for c in 0..2 {
+                    r[c][k] = (p[c] - centre[c]) * per_length[c];
+                }
+            }
+            let step = per_length.map(|s| dt * s);
+            let ways = ways(self.simd, &self.currents[cell], &r, step);
+            for (k, &p) in points.iter().enumerate() {
+                let journey = if ways.inside[k] {
+                    let to = [0, 1].map(|c| p[c] + dt * ways.velocity[c][k]);
+                    let middle = (cell, [ways.middle[0][k], ways.middle[1][k]]);
+                    Journey { to, left: false, held: false, middle }
+                } else {
+                    self.travel(cell, p)
+                };
+                arrive(TOGETHER * at + k, journey);
+            }
+        }
     }
 
     /// Velocity gradient at the middle of a journey.

@@ -14,6 +14,7 @@
 use super::quadrature::{CutStiffness, IntegrationPoint, Quadrature};
 use super::spin::SpinModes;
 use crate::laws::point::PointLaw;
+use crate::simd::{Simd, dispatch, multiply_add};
 use crate::space::shape::{
     CENTRE, D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, N_AT_GAUSS, NODES,
     PRESSURE_MASS, Shape, Table,
@@ -82,6 +83,7 @@ impl Rates {
         Rates::of(&Gradient::at(s, u))
     }
 
+    #[inline(always)]
     pub fn of<const D: usize>(g: &Gradient<D>) -> Self {
         let ([ux, vx], [uy, vy]) = ([g.x[0], g.x[1]], [g.y[0], g.y[1]]);
         Rates {
@@ -93,6 +95,7 @@ impl Rates {
     }
 
     /// Power per volume, without the pressure's.
+    #[inline(always)]
     pub fn power(&self, law: &PointLaw) -> f64 {
         law.shear.quadratic(self.d)
             + law.dilation * self.trace * self.trace
@@ -116,6 +119,7 @@ pub struct Stress<const D: usize> {
 }
 
 impl<const D: usize> Stress<D> {
+    #[inline(always)]
     pub fn new(law: &PointLaw, r: &Rates, volume: f64) -> Self {
         let t0 = volume * (law.shear.a * r.d[0] + law.shear.c * r.d[1]);
         let t1 = volume * (law.shear.c * r.d[0] + law.shear.b * r.d[1]);
@@ -146,7 +150,7 @@ impl<const D: usize> Stress<D> {
 
 /// [`Gradient`]s or [`Stress`]es at the nine Gauss points, component by component.
 ///
-/// Sums over nodes or points then run over contiguous numbers, which SSE2 halves.
+/// Sums over nodes or points then run over contiguous numbers.
 struct GaussField<const D: usize> {
     x: [[f64; 9]; D],
     y: [[f64; 9]; D],
@@ -154,23 +158,33 @@ struct GaussField<const D: usize> {
 }
 
 impl<const D: usize> GaussField<D> {
-    fn gradient(u: &Nodal<D>, [hx, hy]: [f64; 2]) -> Self {
-        let component = |c: usize| -> [f64; NODES] { std::array::from_fn(|a| u[a][c]) };
-        GaussField {
-            x: std::array::from_fn(|c| combine(&D_XI_AT_GAUSS.by_node, &component(c), 2.0 / hx)),
-            y: std::array::from_fn(|c| combine(&D_ETA_AT_GAUSS.by_node, &component(c), 2.0 / hy)),
-            w: if D == 3 { combine(&N_AT_GAUSS.by_node, &component(D - 1), 1.0) } else { [0.0; 9] },
+    #[inline(always)]
+    fn gradient<const FMA: bool>(u: &Nodal<D>, [hx, hy]: [f64; 2]) -> Self {
+        let mut out = GaussField { x: [[0.0; 9]; D], y: [[0.0; 9]; D], w: [0.0; 9] };
+        for c in 0..D {
+            let mut component = [0.0; NODES];
+            for a in 0..NODES {
+                component[a] = u[a][c];
+            }
+            out.x[c] = combine::<FMA>(&D_XI_AT_GAUSS.by_node, &component, 2.0 / hx);
+            out.y[c] = combine::<FMA>(&D_ETA_AT_GAUSS.by_node, &component, 2.0 / hy);
+            if c == 2 {
+                out.w = combine::<FMA>(&N_AT_GAUSS.by_node, &component, 1.0);
+            }
         }
+        out
     }
 
+    #[inline(always)]
     fn gradient_at(&self, g: usize) -> Gradient<D> {
-        Gradient {
-            x: std::array::from_fn(|c| self.x[c][g]),
-            y: std::array::from_fn(|c| self.y[c][g]),
-            w: self.w[g],
+        let mut out = Gradient { x: [0.0; D], y: [0.0; D], w: self.w[g] };
+        for c in 0..D {
+            (out.x[c], out.y[c]) = (self.x[c][g], self.y[c][g]);
         }
+        out
     }
 
+    #[inline(always)]
     fn set_stress(&mut self, g: usize, t: &Stress<D>) {
         for c in 0..D {
             (self.x[c][g], self.y[c][g]) = (t.x[c], t.y[c]);
@@ -179,17 +193,18 @@ impl<const D: usize> GaussField<D> {
     }
 
     /// Nodal forces of stresses.
-    fn force(&self, [hx, hy]: [f64; 2]) -> Nodal<D> {
+    #[inline(always)]
+    fn force<const FMA: bool>(&self, [hx, hy]: [f64; 2]) -> Nodal<D> {
         let mut f = [[0.0; D]; NODES];
         for c in 0..D {
-            let x = combine(&D_XI_AT_GAUSS.by_point, &self.x[c], 2.0 / hx);
-            let y = combine(&D_ETA_AT_GAUSS.by_point, &self.y[c], 2.0 / hy);
+            let x = combine::<FMA>(&D_XI_AT_GAUSS.by_point, &self.x[c], 2.0 / hx);
+            let y = combine::<FMA>(&D_ETA_AT_GAUSS.by_point, &self.y[c], 2.0 / hy);
             for a in 0..NODES {
                 f[a][c] = x[a] + y[a];
             }
         }
         if D == 3 {
-            let n = combine(&N_AT_GAUSS.by_point, &self.w, 1.0);
+            let n = combine::<FMA>(&N_AT_GAUSS.by_point, &self.w, 1.0);
             for a in 0..NODES {
                 f[a][D - 1] += n[a];
             }
@@ -200,14 +215,17 @@ impl<const D: usize> GaussField<D> {
 
 /// `scale sum_k v[k] table[k]`
 #[inline(always)]
-fn combine(table: &[[f64; 9]; 9], v: &[f64; 9], scale: f64) -> [f64; 9] {
+fn combine<const FMA: bool>(table: &[[f64; 9]; 9], v: &[f64; 9], scale: f64) -> [f64; 9] {
     let mut out = [0.0; 9];
     for k in 0..9 {
         for i in 0..9 {
-            out[i] += v[k] * table[k][i];
+            out[i] = multiply_add::<FMA>(v[k], table[k][i], out[i]);
         }
     }
-    out.map(|x| scale * x)
+    for i in 0..9 {
+        out[i] *= scale;
+    }
+    out
 }
 
 /// What a cell's stresses do: nodal forces, and powers that come with them.
@@ -221,7 +239,13 @@ pub struct Internal<const D: usize> {
 
 impl<const D: usize> Internal<D> {
     /// Of a cell of this size with nodal values `u`.
-    pub fn new(quadrature: &Quadrature, cell: usize, size: [f64; 2], u: &Nodal<D>) -> Self {
+    pub fn new(
+        simd: Simd,
+        quadrature: &Quadrature,
+        cell: usize,
+        size: [f64; 2],
+        u: &Nodal<D>,
+    ) -> Self {
         let mut out = match quadrature.gauss_points(cell) {
             None => Internal::at_any_points(quadrature, cell, size, u),
             Some(points) => {
@@ -233,7 +257,7 @@ impl<const D: usize> Internal<D> {
                         p.law = p.law.with_viscosity_scaled(cut.rest);
                     }
                 }
-                let mut out = Internal::at_gauss_points(&points, size, u);
+                let mut out = at_gauss_points(simd, &points, size, u);
                 cut.iter().for_each(|cut| out.add_cut(cut, u));
                 out
             }
@@ -255,17 +279,6 @@ impl<const D: usize> Internal<D> {
         }
     }
 
-    fn at_gauss_points(points: &[IntegrationPoint; 9], size: [f64; 2], u: &Nodal<D>) -> Self {
-        let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
-        let mut field = GaussField::gradient(u, size);
-        for (g, p) in points.iter().enumerate() {
-            let rates = Rates::of(&field.gradient_at(g));
-            field.set_stress(g, &out.stress(p, &rates, size));
-        }
-        out.force = field.force(size);
-        out
-    }
-
     fn at_any_points(quadrature: &Quadrature, cell: usize, size: [f64; 2], u: &Nodal<D>) -> Self {
         let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
         quadrature.for_points(cell, |p, shape| {
@@ -277,12 +290,36 @@ impl<const D: usize> Internal<D> {
     }
 
     /// Stress at a point, whose powers are added.
+    #[inline(always)]
     fn stress(&mut self, p: &IntegrationPoint, r: &Rates, [hx, hy]: [f64; 2]) -> Stress<D> {
         let volume = p.weight * hx * hy;
         self.dissipation += volume * r.power(&p.law);
         self.strain += volume * r.strain_squared();
         Stress::new(&p.law, r, volume)
     }
+}
+
+dispatch! {
+    /// [`Internal`] of a cell whose points are those of the Gauss rule.
+    fn at_gauss_points<const D: usize>(
+        points: &[IntegrationPoint; 9], size: [f64; 2], u: &Nodal<D>,
+    ) -> Internal<D> = at_gauss_points_kernel
+}
+
+#[inline(always)]
+fn at_gauss_points_kernel<const LENGTH: usize, const FMA: bool, const D: usize>(
+    points: &[IntegrationPoint; 9],
+    size: [f64; 2],
+    u: &Nodal<D>,
+) -> Internal<D> {
+    let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
+    let mut field = GaussField::gradient::<FMA>(u, size);
+    for (g, p) in points.iter().enumerate() {
+        let rates = Rates::of(&field.gradient_at(g));
+        field.set_stress(g, &out.stress(p, &rates, size));
+    }
+    out.force = field.force::<FMA>(size);
+    out
 }
 
 /// Adds the stiffness of a point of volume `volume` to the element matrix: only blocks of
@@ -538,8 +575,21 @@ mod tests {
 
     fn stiffness_times_vector_is_the_internal_force<const D: usize>() {
         let (k, u) = (stiffness::<D>(), some_values::<D>());
-        let internal = Internal::at_gauss_points(&points(), SIZE, &u);
-        let by_point = force_point_by_point(&u);
+        for simd in crate::simd::all() {
+            internal_force_is_that_of_the_stiffness(
+                &k,
+                &u,
+                &at_gauss_points(simd, &points(), SIZE, &u),
+            );
+        }
+    }
+
+    fn internal_force_is_that_of_the_stiffness<const D: usize>(
+        k: &Matrix,
+        u: &Nodal<D>,
+        internal: &Internal<D>,
+    ) {
+        let by_point = force_point_by_point(u);
         let mut power = 0.0;
         for a in 0..NODES {
             for c in 0..D {
@@ -575,7 +625,7 @@ mod tests {
             let (x, y) = ((a % 3) as f64 * 0.5 * SIZE[0], (a / 3) as f64 * 0.5 * SIZE[1]);
             [-0.9 * y + 0.2, 0.9 * x - 0.1, 0.9]
         });
-        let internal = Internal::at_gauss_points(&points(), SIZE, &u);
+        let internal = at_gauss_points(Simd::detect(), &points(), SIZE, &u);
         assert!(internal.force.iter().flatten().all(|f| f.abs() < 1e-13));
         assert!(internal.dissipation < 1e-25);
     }

@@ -31,6 +31,7 @@ use super::matrices::{Ingredients, Matrices};
 use super::multifrontal::tree::{NO_POSITION, Tree};
 use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
 use super::quadrature::Quadrature;
+use crate::simd::Simd;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
 use crate::space::incidence::Incidence;
@@ -151,6 +152,7 @@ pub struct Stokes<const D: usize> {
     factor: Multifrontal<D>,
     /// Unaugmented diagonal, per node.
     diagonal: Vec<[f64; D]>,
+    simd: Simd,
     work: Work<D>,
 }
 
@@ -259,6 +261,7 @@ impl<const D: usize> Stokes<D> {
             matrices: Matrices::new(mesh.cells()),
             factor: Multifrontal::new(tree, mesh.cells()),
             diagonal: vec![[0.0; D]; mesh.nodes()],
+            simd: Simd::detect(),
             work: Work::default(),
             mesh,
             constraints,
@@ -412,7 +415,7 @@ impl<const D: usize> Stokes<D> {
         let nodes = &self.incidence.nodes[cell];
         let size = self.mesh.cell_size(cell);
         let u = nodes.map(|n| flow.velocity[n]);
-        let internal = Internal::new(quadrature, cell, size, &u);
+        let internal = Internal::new(self.simd, quadrature, cell, size, &u);
         let divergence = Divergence::new(size);
         let mass = pressure_mass(size[0] * size[1]);
         let pressure = flow.pressure[cell];

@@ -8,8 +8,9 @@
 //! only the lower triangle matters, is the *update* that the parent is assembled from. The update is
 //! stored in blocks of [`BLOCK`] columns, each from its first diagonal entry down.
 
-use super::kernels::{self, Columns, ColumnsMut, PANEL, Product, Simd};
+use super::kernels::{self, Columns, ColumnsMut, PANEL, Product};
 use super::tree::Run;
+use crate::simd::Simd;
 
 /// Columns of a block of an update.
 const BLOCK: usize = 64;

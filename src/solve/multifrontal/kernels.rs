@@ -1,9 +1,7 @@
-//! Dense kernels on columns, for the widest vectors that the processor has.
-//!
-//! Each kernel is written once, over short arrays that a compiler turns into vectors, and compiled
-//! for AVX-512, for AVX2 and for what every processor of the target has; the processor is asked at
-//! run time. Matrices are stored column by column: entry `(i, j)` is at `i + j ld`.
+//! Dense kernels on columns, for the widest vectors that the processor has (see [`simd`](crate::simd)).
+//! Matrices are stored column by column: entry `(i, j)` is at `i + j ld`.
 
+use crate::simd::{Simd, dispatch, multiply_add};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 
@@ -13,36 +11,6 @@ pub const PANEL: usize = 8;
 /// From this many multiplications per column and this depth on faer's packed product is faster.
 const PACKED_DEPTH: usize = 48;
 const PACKED_ROWS: usize = 96;
-
-/// Instruction sets that kernels are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Simd {
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    Portable,
-}
-
-impl Simd {
-    /// The best that this processor has.
-    pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("fma")
-            {
-                return Simd::Avx512;
-            }
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                return Simd::Avx2;
-            }
-        }
-        Simd::Portable
-    }
-}
 
 /// Columns of a matrix, to be read.
 #[derive(Clone, Copy)]
@@ -63,40 +31,6 @@ pub struct Product {
     pub rows: usize,
     pub columns: usize,
     pub depth: usize,
-}
-
-/// Defines a function that runs a kernel as compiled for an instruction set.
-///
-/// SAFETY of the calls: `Simd::Avx512` and `Simd::Avx2` are made by [`Simd::detect`] only after the
-/// processor said that it has the features which the callee is compiled with; the callee itself is
-/// safe code.
-macro_rules! dispatch {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $kernel:ident) => {
-        $(#[$doc])*
-        $vis fn $name(simd: Simd, $($arg: $type),*) $(-> $out)? {
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
-            fn avx512($($arg: $type),*) $(-> $out)? {
-                $kernel::<16, true>($($arg),*)
-            }
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2,fma")]
-            fn avx2($($arg: $type),*) $(-> $out)? {
-                $kernel::<8, true>($($arg),*)
-            }
-            match simd {
-                #[cfg(target_arch = "x86_64")]
-                #[allow(unsafe_code)]
-                Simd::Avx512 => unsafe { avx512($($arg),*) },
-                #[cfg(target_arch = "x86_64")]
-                #[allow(unsafe_code)]
-                Simd::Avx2 => unsafe { avx2($($arg),*) },
-                Simd::Portable => {
-                    $kernel::<8, { cfg!(any(target_arch = "aarch64", target_feature = "fma")) }>($($arg),*)
-                }
-            }
-        }
-    };
 }
 
 dispatch! {
@@ -146,10 +80,10 @@ pub fn subtract_square(simd: Simd, c: ColumnsMut, a: Columns, size: Product) {
     }
 }
 
-/// `c - a b`, in one rounding where that is an instruction.
+/// `c - a b`
 #[inline(always)]
 fn negated_product<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FMA { (-a).mul_add(b, c) } else { c - a * b }
+    multiply_add::<FMA>(-a, b, c)
 }
 
 #[inline(always)]
@@ -490,15 +424,7 @@ fn subtract_products<const W: usize, const FMA: bool>(a: Columns, y: &[f64], x: 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn sets() -> Vec<Simd> {
-        let best = Simd::detect();
-        #[cfg(target_arch = "x86_64")]
-        if best == Simd::Avx512 {
-            return vec![Simd::Portable, Simd::Avx2, best];
-        }
-        if best == Simd::Portable { vec![best] } else { vec![Simd::Portable, best] }
-    }
+    use crate::simd;
 
     fn numbers(n: usize) -> Vec<f64> {
         (0..n).map(|k| ((k * k) as f64 * 0.37 + 1.0).sin()).collect()
@@ -507,7 +433,7 @@ mod tests {
     /// Every instruction set does what plain loops do.
     #[test]
     fn products_are_those_of_plain_loops() {
-        for simd in sets() {
+        for simd in simd::all() {
             for (rows, columns, depth) in [(1, 1, 1), (7, 3, 2), (42, 32, 10), (130, 17, 64)] {
                 let (ld_a, ld_c) = (rows + 3, rows + 1);
                 let a = numbers(ld_a * depth);
@@ -531,7 +457,7 @@ mod tests {
     /// `L1 L1'` and `L2 L1'` give the matrix back, and both substitutions invert it.
     #[test]
     fn panels_and_substitutions_invert() {
-        for simd in sets() {
+        for simd in simd::all() {
             for (own, rim) in [(1, 0), (2, 5), (8, 8), (10, 32), (21, 13)] {
                 let rows = own + rim;
                 let mut a = vec![0.0; rows * own];
@@ -591,7 +517,7 @@ mod tests {
 
     #[test]
     fn pivots_that_are_not_positive_are_named_and_idle_ones_pass() {
-        for simd in sets() {
+        for simd in simd::all() {
             let mut a = vec![0.0; 16];
             (a[0], a[5], a[10], a[15]) = (4.0, 0.0, -1.0, 1.0);
             let c = ColumnsMut { data: &mut a, ld: 4 };

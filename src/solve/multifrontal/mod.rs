@@ -19,9 +19,10 @@ mod kernels;
 pub mod tree;
 
 use super::element::{CellBlocks, pair};
+use crate::simd::Simd;
 use crate::threads;
 use front::{Matrix, Size};
-use kernels::{Columns, Simd};
+use kernels::Columns;
 use std::ops::Range;
 use std::sync::Arc;
 use tree::{Run, Source, Tree};
