@@ -12,11 +12,14 @@
 //! ```
 
 pub mod clock;
+mod examine;
+pub mod guard;
 pub mod initial;
 mod measure;
 pub mod picture;
 pub mod row;
 mod sampling;
+pub mod state;
 
 use crate::motion::advect;
 use crate::motion::carrier::Carrier;
@@ -35,8 +38,11 @@ use crate::space::neighbours::{Face, Neighbours, open_faces};
 use crate::space::particles::Particles;
 use crate::space::population::{Count, Population};
 use clock::{Limiter, next_step};
+pub use examine::{Fault, Place};
 use initial::Unfilled;
+pub use measure::empty_row;
 use row::{Phases, Row};
+use state::{State, StateError};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -53,12 +59,32 @@ pub enum SimError {
     Solve { step: u64, time: f64, source: SolveError },
     #[error("step {step}, t = {time:.6e} s: the time step has become {dt:.1e} s")]
     Step { step: u64, time: f64, dt: f64 },
+    /// The step was taken, but its result cannot be.
+    #[error("step {step}, t = {time:.6e} s: {fault}")]
+    Fault { step: u64, time: f64, fault: Fault },
+    /// Shorter steps do not help either.
+    #[error("{source}; the {}", tried(*.cuts))]
+    Cut {
+        cuts: u32,
+        #[source]
+        source: Box<SimError>,
+    },
+}
+
+/// What was tried before a run was given up.
+fn tried(cuts: u32) -> String {
+    format!("step was taken again {cuts} times, ever shorter, and failed each time")
 }
 
 impl SimError {
     /// The field went to infinity or not-a-number.
     pub fn is_non_finite(&self) -> bool {
-        matches!(self, SimError::Solve { source: SolveError::NonFinite { .. }, .. })
+        match self {
+            SimError::Solve { source: SolveError::NonFinite { .. }, .. } => true,
+            SimError::Fault { fault, .. } => fault.is_non_finite(),
+            SimError::Cut { source, .. } => source.is_non_finite(),
+            _ => false,
+        }
     }
 
     /// What the user can do about it.
@@ -85,6 +111,8 @@ impl SimError {
                 "likely cause: a speed that grows without bound; look at the last frames, and \
                  lower accuracy.cells or the contrast"
             }
+            SimError::Fault { fault, .. } => fault.remedy(),
+            SimError::Cut { source, .. } => source.remedy(),
         }
     }
 }
@@ -97,6 +125,8 @@ pub struct Simulation<const D: usize> {
     plan: Arc<Plan>,
     stokes: Stokes<D>,
     quadrature: Quadrature,
+    /// Of [`Quadrature::factors`]: those that its points were made with.
+    factors_of_points: Vec<f64>,
     weight: Weight,
     restoring: Restoring,
     /// Those that restoring terms may lie on; none where no scene calls for them.
@@ -126,6 +156,10 @@ pub struct Simulation<const D: usize> {
     row: Row,
     report: Report,
     events: Vec<String>,
+    /// No step may be longer (SI); see [`Run::limit_step`].
+    longest: Option<f64>,
+    /// The step that is being taken, or was.
+    attempted: f64,
 }
 
 /// A run whose number of unknowns per node was decided by its plan.
@@ -156,6 +190,16 @@ pub trait Run: Send {
     fn changes_applied(&self) -> usize;
     /// Goes on with another plan, made by [`Plan::with_change`]: the two share all that lies behind.
     fn replan(&mut self, plan: Arc<Plan>);
+    /// Everything that the next step depends on.
+    fn state(&self) -> State;
+    /// Goes on from a state of a run of the same plan, to the last bit as that one would.
+    fn restore(&mut self, state: &State) -> Result<(), StateError>;
+    /// Steps may be no longer than this (s) until told otherwise.
+    fn limit_step(&mut self, longest: Option<f64>);
+    /// Length of the step that was taken or tried last, s.
+    fn attempted_step(&self) -> f64;
+    /// The first thing about the present state that cannot be.
+    fn examine(&self) -> Result<(), Fault>;
 }
 
 /// Velocity and rotation (zero if none is solved) of a flow, m/s and 1/s, at an SI point.
@@ -226,6 +270,9 @@ impl<const D: usize> Simulation<D> {
             row: measure::empty_row(&plan),
             report: Report::default(),
             events: vec![],
+            longest: None,
+            attempted: 0.0,
+            factors_of_points: vec![],
             particles,
             stokes,
             plan,
@@ -252,8 +299,14 @@ impl<const D: usize> Simulation<D> {
         let speeds = self.speeds();
         let (mut dt, mut limiter) =
             next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.1), speeds);
+        if let Some(longest) = self.longest.map(|dt| dt / self.plan.units.time)
+            && dt > longest
+        {
+            (dt, limiter) = (longest, Limiter::Guard);
+        }
         let mut extra = 0;
         let half = loop {
+            self.attempted = dt;
             if dt.is_nan() || self.time + dt <= self.time {
                 let dt = dt * self.plan.units.time;
                 return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
@@ -434,6 +487,7 @@ impl<const D: usize> Simulation<D> {
         let plan = self.plan.clone();
         let phase = Instant::now();
         let (step, time) = (self.step, self.si_time());
+        self.factors_of_points = self.quadrature.factors().to_vec();
         self.quadrature
             .update(&plan.mesh, &self.particles, &self.matter.materials, self.version)
             .map_err(|mut source| {
@@ -580,5 +634,20 @@ impl<const D: usize> Run for Simulation<D> {
     }
     fn replan(&mut self, plan: Arc<Plan>) {
         self.plan = plan;
+    }
+    fn state(&self) -> State {
+        self.save()
+    }
+    fn restore(&mut self, state: &State) -> Result<(), StateError> {
+        self.load(state)
+    }
+    fn limit_step(&mut self, longest: Option<f64>) {
+        self.longest = longest;
+    }
+    fn attempted_step(&self) -> f64 {
+        self.attempted * self.plan.units.time
+    }
+    fn examine(&self) -> Result<(), Fault> {
+        self.find_fault()
     }
 }

@@ -5,6 +5,7 @@ mod compare;
 mod cost;
 mod recording;
 mod refusals;
+mod resume;
 mod runs;
 mod stress;
 

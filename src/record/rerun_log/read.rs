@@ -189,7 +189,7 @@ impl Recorded {
 
 /// Whether a file has the footer that is written when a recording is closed. The decoder takes an
 /// end without one for an end.
-fn is_closed(file: &mut File) -> std::io::Result<bool> {
+pub(super) fn is_closed(file: &mut File) -> std::io::Result<bool> {
     // It ends with its two names and the number of its entries.
     const TAIL: i64 = 12;
     let mut names = [0; 8];

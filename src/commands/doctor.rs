@@ -1,0 +1,7 @@
+//! `grainscope doctor`.
+use super::{Failure, print};
+#[derive(clap::Args)]
+pub struct Args {}
+pub fn run(_: &Args) -> Result<(), Failure> {
+    print("")
+}
