@@ -7,6 +7,7 @@ mod cost_page;
 mod doctor;
 mod explore;
 mod figure;
+mod memory;
 mod plan;
 mod presets;
 mod purchase;

@@ -49,6 +49,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let source = scene::load(folder.join("scene.toml"))?;
     let (scene, plan) = super::resolve(&source)?;
+    super::memory::afford(&plan)?;
     let (plan, hash) = (Arc::new(plan), scene_hash(&scene));
     let interrupted = Arc::new(AtomicBool::new(false));
     run::watch_interrupts(&interrupted);

@@ -2,7 +2,7 @@
 
 use super::purchase::{self, Bought};
 use super::safety::Safety;
-use super::{Failure, print, resume, tell};
+use super::{Failure, memory, print, resume, tell};
 use crate::frame::Frame;
 use crate::plan::Plan;
 use crate::record::checkpoint;
@@ -111,6 +111,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     watch_interrupts(&interrupted);
     let plan = Arc::new(plan);
+    memory::afford(&plan)?;
     // Fills cells and solves once: scenes that cannot start leave no folder behind.
     let clock = Instant::now();
     let run = sim::start(plan.clone())?;
@@ -436,8 +437,8 @@ impl Session {
     }
 
     fn steps(&mut self, mut watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
+        self.guard.begin(self.run.as_ref())?;
         if self.rows.is_empty() {
-            self.guard.begin(self.run.as_ref())?;
             self.observe(vec![])?;
         }
         watch(self.run.as_ref());

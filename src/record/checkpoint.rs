@@ -83,9 +83,14 @@ pub fn encode(state: &State, scene_hash: &str) -> Vec<u8> {
             Column::Bytes(v) => out.extend(v),
         }
     }
-    let checksum = Sha256::digest(&out);
-    out.extend(checksum);
-    out
+    sealed(out)
+}
+
+/// Content with its checksum.
+pub fn sealed(mut content: Vec<u8>) -> Vec<u8> {
+    let checksum = Sha256::digest(&content);
+    content.extend(checksum);
+    content
 }
 
 /// The state in the bytes of a checkpoint of the scene with this hash.
@@ -188,7 +193,11 @@ pub fn write(
 }
 
 fn replace(within: &Path, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    std::fs::create_dir_all(within)?;
+    // The run's own folder is not made anew: where it is gone, so is the rest of the run.
+    match std::fs::create_dir(within) {
+        Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => return Err(e),
+        _ => {}
+    }
     let part = path.with_extension("part");
     let written = File::create(&part).and_then(|mut file| {
         file.write_all(bytes)?;

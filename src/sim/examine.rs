@@ -222,3 +222,67 @@ impl<const D: usize> Simulation<D> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{plan, scene};
+    use std::sync::Arc;
+
+    fn silo() -> Simulation<3> {
+        let source = scene::presets::find("silo").expect("listed");
+        let source = source.with_sets(&["accuracy.cells=2".into()]).expect("valid");
+        let plan = plan::resolve(&scene::parse(&source).expect("valid")).expect("valid");
+        Simulation::new(Arc::new(plan)).expect("solved")
+    }
+
+    #[test]
+    fn a_good_state_has_no_fault() {
+        assert_eq!(silo().find_fault(), Ok(()));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_named_with_its_place() {
+        let mut sim = silo();
+        sim.particles.volume[7] = f64::NAN;
+        let fault = sim.find_fault().expect_err("a fault");
+        assert!(fault.is_non_finite() && !fault.is_tolerable());
+        let cell = sim.plan.mesh.locate(sim.particles.position[7]);
+        let said = fault.to_string();
+        assert!(said.contains("the volume is NaN"), "{said}");
+        assert!(said.contains(&format!("at particle 7 in cell {cell}, (")), "{said}");
+        assert!(fault.remedy().contains("likely cause"));
+
+        let mut sim = silo();
+        sim.flow.velocity[10][2] = f64::INFINITY;
+        let said = sim.find_fault().expect_err("a fault").to_string();
+        assert!(
+            said.contains("the rotation is inf") && said.contains("at a node of cell"),
+            "{said}"
+        );
+        let mut sim = silo();
+        sim.flow.pressure[3][1] = f64::NAN;
+        let said = sim.find_fault().expect_err("a fault").to_string();
+        assert!(said.contains("the pressure is NaN") && said.contains("in cell 3, ("), "{said}");
+        let mut sim = silo();
+        sim.row.gauges[0].rate = f64::NAN;
+        assert!(sim.find_fault().expect_err("a fault").to_string().contains("a gauge is NaN"));
+    }
+
+    #[test]
+    fn what_cannot_be_is_a_fault_though_it_is_finite() {
+        let mut sim = silo();
+        sim.particles.volume[7] = -1.0;
+        assert!(matches!(sim.find_fault(), Err(Fault::NotPositive { field: "the volume", .. })));
+        let mut sim = silo();
+        sim.particles.position[2] = [1e3, 0.0];
+        assert!(matches!(sim.find_fault(), Err(Fault::Outside { .. })));
+        let mut sim = silo();
+        sim.row.power_error = 0.1;
+        assert!(matches!(sim.find_fault(), Err(f @ Fault::Power { .. }) if f.is_tolerable()));
+        let mut sim = silo();
+        sim.row.drift[0] = -0.5;
+        let fault = sim.find_fault().expect_err("a fault");
+        assert!(fault.is_tolerable() && fault.to_string().contains("`grains`"), "{fault}");
+    }
+}

@@ -151,6 +151,8 @@ impl RerunLog {
             Sink::Save(path) => Some(path.clone()),
             _ => None,
         });
+        // Only a file can be taken up again, not a pipe or a device.
+        let path = path.filter(|p| p.metadata().map_or(true, |m| m.is_file()));
         let Some(path) = path else {
             let log = Self::open(info, sinks)?;
             let notice = Some(format!("what is watched begins at step {step}"));
