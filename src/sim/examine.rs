@@ -123,7 +123,7 @@ fn inside(mesh: &Mesh, p: [f64; 2]) -> bool {
 }
 
 impl<const D: usize> Simulation<D> {
-    /// The first thing that cannot be: numbers of the flow, of particles, of the row.
+    /// The first thing that cannot be: numbers of loads and flow, of particles, of the row.
     pub(super) fn find_fault(&self) -> Result<(), Fault> {
         self.faults_of_flow()?;
         self.faults_of_particles()?;
@@ -132,12 +132,17 @@ impl<const D: usize> Simulation<D> {
 
     fn faults_of_flow(&self) -> Result<(), Fault> {
         let mesh = &self.plan.mesh;
-        if let Some((k, value)) = first_bad(self.flow.velocity.as_flattened()) {
-            let field = if k % D == 2 { "the rotation" } else { "the velocity" };
-            let at = mesh.node_position(k / D);
-            let [x, y] = self.plan.si(at);
-            let place = Place::Node { cell: mesh.locate(at), x, y };
-            return Err(Fault::NonFinite { field, value, place });
+        for (names, nodal) in [
+            (["the load", "the couple of the load"], &self.load),
+            (["the velocity", "the rotation"], &self.flow.velocity),
+        ] {
+            if let Some((k, value)) = first_bad(nodal.as_flattened()) {
+                let at = mesh.node_position(k / D);
+                let [x, y] = self.plan.si(at);
+                let place = Place::Node { cell: mesh.locate(at), x, y };
+                let field = names[usize::from(k % D == 2)];
+                return Err(Fault::NonFinite { field, value, place });
+            }
         }
         if let Some((k, value)) = first_bad(self.flow.pressure.as_flattened()) {
             let cell = k / 3;

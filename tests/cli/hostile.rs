@@ -275,7 +275,7 @@ fn checkpoints() {
 #[test]
 fn recordings() {
     let here = TempFolder::new();
-    let run = ["run", "couette_cosserat", "--set", "accuracy.cells=2", "--steps", "2"];
+    let run = ["run", "couette_cosserat", "--set", "accuracy.cells=4", "--steps", "2"];
     here.grainscope(&[&run[..], &["--out", "run"]].concat()).exits(0);
     let good = std::fs::read(here.path("run/recording.rrd")).expect("a recording");
     let path = here.path("x.rrd");
@@ -297,7 +297,7 @@ fn recordings() {
         try_one("repair", k, &bytes, || {
             let _ = repair(&path);
         });
-        let _ = open_all(std::slice::from_ref(&path));
+        let _ = open_all(&[path.clone(), path.clone()]);
     });
     println!("{count} recordings: {refused} refused, {taken} read as far as they go");
 }
@@ -306,7 +306,7 @@ fn recordings() {
 fn requests() {
     let here = TempFolder::new();
     let mut child = here
-        .command(&["explore", "couette_cosserat", "--paused", "--set", "accuracy.cells=2"])
+        .command(&["explore", "couette_cosserat", "--paused", "--set", "accuracy.cells=4"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

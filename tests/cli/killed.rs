@@ -23,9 +23,9 @@ const RUN: [&str; 11] = [
     "--set",
     "recording.frames=400",
     "--until",
-    "2e-4",
+    "1e-4",
     "--checkpoint-every",
-    "3",
+    "2",
     "--out",
 ];
 
