@@ -6,17 +6,14 @@
 //! Either is written beside its place and renamed, so that no recording is ever lost on the way.
 
 use std::collections::HashSet;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use rerun::EntityPath;
-use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_log_types::{StoreKind, TimelineName};
-use rerun::log::{Chunk, LogMsg};
+use rerun::log::LogMsg;
 use rerun::sink::LogSink;
 
-use super::read::{ReadError, below_run, is_closed};
+use super::read::{ReadError, below_run, chunk_of, messages};
 use super::sinks::{Destinations, RrdFile, Saved, Sink};
 use super::{RecordError, RerunLog, STEP};
 use crate::frame::RunInfo;
@@ -47,15 +44,10 @@ pub struct Resumed {
 
 /// Hands on the messages of a recording up to a step, or all of them.
 fn keep(path: &Path, until: Option<u64>, mut each: impl FnMut(LogMsg)) -> Result<Kept, ReadError> {
-    let opened = |source| ReadError::Open { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(opened)?;
-    let closed = is_closed(&mut file).map_err(opened)?;
-    let messages = DecoderApp::decode_eager(BufReader::new(file))
-        .map_err(|e| ReadError::Unreadable { path: path.to_owned(), cause: e.to_string() })?;
-    let mut kept =
-        Kept { cut: (!closed).then(|| "its end is missing".to_owned()), ..Kept::default() };
+    let (messages, cut) = messages(path)?;
+    let mut kept = Kept { cut, ..Kept::default() };
     for message in messages {
-        match message.map_err(|e| e.to_string()).and_then(|m| kept.take(m, until)) {
+        match message.and_then(|m| kept.take(m, until)) {
             Ok(Some(message)) => {
                 kept.messages += 1;
                 each(message);
@@ -83,7 +75,7 @@ impl Kept {
             }
             other => return Ok(Some(other)),
         };
-        let chunk = Chunk::from_arrow_msg(&arrow).map_err(|e| e.to_string())?;
+        let chunk = chunk_of(&arrow)?;
         let path = below_run(&chunk).map(|(_, path)| path).unwrap_or_default();
         self.has_scene |= path == ["scene"];
         if path.iter().any(|part| part == "isolines") {
