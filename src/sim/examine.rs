@@ -55,7 +55,7 @@ impl std::fmt::Display for Place {
 /// Something that cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
-    #[error("{field} is {value}, which is not finite, {place}")]
+    #[error("{field} is {value:e}, {}, {place}", excess(*.value))]
     NonFinite { field: &'static str, value: f64, place: Place },
     #[error("{field} is {value:e}, which must be above zero, {place}")]
     NotPositive { field: &'static str, value: f64, place: Place },
@@ -112,9 +112,17 @@ impl Fault {
     }
 }
 
-/// The first number that is not finite, and its index.
+/// Numbers beyond this have no finite square, and norms are sums of squares.
+const LARGEST: f64 = 1e150;
+
+fn excess(value: f64) -> &'static str {
+    if value.is_finite() { "whose square is not finite" } else { "which is not finite" }
+}
+
+/// The first number that is not finite, or whose square is not, and its index.
 fn first_bad<'a>(values: impl IntoIterator<Item = &'a f64>) -> Option<(usize, f64)> {
-    values.into_iter().copied().enumerate().find(|(_, v)| !v.is_finite())
+    let good = |v: f64| v.abs() < LARGEST;
+    values.into_iter().copied().enumerate().find(|&(_, v)| !good(v))
 }
 
 fn inside(mesh: &Mesh, p: [f64; 2]) -> bool {
