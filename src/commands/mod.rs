@@ -43,7 +43,7 @@ mod code {
 const EXIT_CODES: &str = "\
 Exit codes:
   0    ok
-  1    a file, folder, port or viewer cannot be used
+  1    a file, folder, port, viewer or memory cannot be had
   2    usage
   3    the scene is invalid
   4    not converged
