@@ -227,7 +227,8 @@ impl<const D: usize> Simulation<D> {
         let volumes = self.particles.volumes(self.matter.materials.len());
         for ((&drift, volume), material) in r.drift.iter().zip(volumes).zip(&self.matter.materials)
         {
-            if volume > CELLS_THAT_DRIFT * cell && !(drift.abs() <= DRIFT) {
+            let strays = drift.is_nan() || drift.abs() > DRIFT;
+            if volume > CELLS_THAT_DRIFT * cell && strays {
                 let material = material.name.clone();
                 return Err(Fault::Drift { material, drift: drift.abs(), limit: DRIFT });
             }
