@@ -1,6 +1,6 @@
 //! `grainscope check`: validate a scene and do nothing else.
 
-use super::{Failure, print};
+use super::{Failure, print, tell};
 use crate::sim;
 
 #[derive(clap::Args)]
@@ -15,6 +15,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
     let (scene, plan) = super::resolve(&source)?;
+    // Another machine may have the memory.
+    if let Err(Failure::Environment(text)) = super::memory::afford(&plan) {
+        tell(format_args!("warning: {text}"));
+    }
     sim::initial::particles(&plan).map_err(sim::SimError::from)?;
     for w in &plan.warnings {
         eprintln!("warning: {w}");

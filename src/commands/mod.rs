@@ -4,13 +4,18 @@ mod check;
 mod compare;
 mod cost;
 mod cost_page;
+mod doctor;
 mod explore;
 mod export;
 mod figure;
+mod memory;
 mod plan;
 mod presets;
 mod purchase;
+mod repair;
+mod resume;
 mod run;
+mod safety;
 mod stress;
 mod sweep;
 mod verify;
@@ -40,7 +45,7 @@ mod code {
 const EXIT_CODES: &str = "\
 Exit codes:
   0    ok
-  1    a file, folder, port or viewer cannot be used
+  1    a file, folder, port, viewer or memory cannot be had
   2    usage
   3    the scene is invalid
   4    not converged
@@ -76,6 +81,8 @@ struct Cli {
 enum Command {
     /// Run a scene: a preset's name or a TOML file
     Run(run::Args),
+    /// Go on with a run that ended before its end, for whatever reason
+    Resume(resume::Args),
     /// Turn the knobs while it flows, in a page of your browser
     Explore(explore::Args),
     /// Say which effects a scene calls for, and what they cost
@@ -98,6 +105,10 @@ enum Command {
     Sweep(sweep::Args),
     /// Make a figure of the source: runs, plots, snapshots, a recording side by side
     Figure(figure::Args),
+    /// Close a recording, or the files of a run, whose writer was killed
+    Repair(repair::Args),
+    /// Print versions, processor, memory, disk, viewer and ports: what a bug report needs
+    Doctor(doctor::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -170,16 +181,17 @@ impl Failure {
         match self {
             // Without a place in the text the drawing would not name the file.
             Failure::Scene(e) if e.span().is_none() => {
-                eprintln!("error: {}", e.headline());
+                tell(format_args!("error: {}", e.headline()));
                 if let Some(help) = e.remedy() {
-                    eprintln!("  help: {help}");
+                    tell(format_args!("  help: {help}"));
                 }
-                e.others().iter().flat_map(SceneError::lines).for_each(|l| eprintln!("error: {l}"));
+                let others = e.others().iter().flat_map(SceneError::lines);
+                others.for_each(|l| tell(format_args!("error: {l}")));
             }
-            Failure::Scene(e) => eprintln!("{:?}", miette::Report::new(*e)),
-            Failure::Sim(e) => eprintln!("error: {e}\n  help: {}", e.remedy()),
+            Failure::Scene(e) => tell(format_args!("{:?}", miette::Report::new(*e))),
+            Failure::Sim(e) => tell(format_args!("error: {e}\n  help: {}", e.remedy())),
             Failure::Environment(text) | Failure::Usage(text) | Failure::Differs(text) => {
-                eprintln!("error: {text}")
+                tell(format_args!("error: {text}"))
             }
             Failure::Interrupted => {}
         }
@@ -209,6 +221,9 @@ fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
 fn run_command(command: Command) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::run(&args),
+        Command::Resume(args) => resume::run(&args),
+        Command::Repair(args) => repair::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Explore(args) => explore::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Check(args) => check::run(&args),
@@ -245,6 +260,12 @@ fn print(text: &str) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Writes a line to stderr; that nobody listens any more is no fault of a run.
+fn tell(text: impl std::fmt::Display) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Finds a scene by preset name or path, and applies `--set`s.

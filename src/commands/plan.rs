@@ -1,6 +1,7 @@
 //! `grainscope plan`: which effects are solved, why, and what each takes of a step.
 
-use super::{Failure, print};
+use super::memory::{self, Memory};
+use super::{Failure, print, tell};
 use crate::cost::effects;
 use crate::record::text::plan_text;
 use std::sync::Arc;
@@ -28,10 +29,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (_, plan) = super::resolve(&source)?;
     let plan = Arc::new(plan);
     let mut list = plan.describe();
+    let memory = Memory::of(&plan);
     if !args.no_measure {
+        memory::afford(&plan)?;
         eprintln!("taking some steps to measure what each effect takes (--no-measure skips it)");
         effects::measure(&plan, &mut list, STEPS)?;
     }
+    tell(format_args!("a run takes about {memory}"));
     if args.json {
         let text =
             serde_json::to_string_pretty(&list).map_err(|e| Failure::Environment(e.to_string()))?;

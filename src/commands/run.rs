@@ -1,25 +1,29 @@
 //! `grainscope run`: a scene goes in, a recording, tables and plots come out.
 
 use super::purchase::{self, Bought};
-use super::{Failure, print};
+use super::safety::Safety;
+use super::{Failure, memory, print, resume, tell};
 use crate::frame::Frame;
 use crate::plan::Plan;
-use crate::record::logger::{Backpressure, Logger};
+use crate::record::checkpoint;
+use crate::record::logger::{Backpressure, Logger, Traffic};
 use crate::record::rerun_log::{RerunLog, Served, Sink};
 use crate::record::run_plots::plots_of_run;
 use crate::record::series::SeriesWriter;
 use crate::record::summary::{Ending, Summary, Tally};
 use crate::record::text::duration;
 use crate::record::{folder, info};
-use crate::scene::{Quantity, Scene, SceneSource, Scope, to_toml};
+use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash, to_toml};
+use crate::sim::guard::Guard;
 use crate::sim::row::Row;
+use crate::sim::state::{State, StateError, load_phases, save_phases};
 use crate::sim::{self, Run, SimError, picture};
 use crossbeam::channel::bounded;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 #[derive(clap::Args, Default)]
 pub struct Args {
@@ -70,9 +74,26 @@ pub struct Args {
     /// Print seconds per phase at the end
     #[arg(long)]
     profile: bool,
+    #[command(flatten)]
+    safety: Safety,
     /// Several runs at once are quiet: what they say would mix.
     #[arg(skip)]
     quiet: bool,
+}
+
+impl Args {
+    /// Those of a run that goes on.
+    pub(super) fn resumed(args: &resume::Args) -> Args {
+        Args {
+            steps: args.steps,
+            serve: args.serve,
+            port: args.port,
+            safety: args.safety,
+            json: args.json,
+            profile: args.profile,
+            ..Args::default()
+        }
+    }
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
@@ -90,6 +111,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     watch_interrupts(&interrupted);
     let plan = Arc::new(plan);
+    memory::afford(&plan)?;
     // Fills cells and solves once: scenes that cannot start leave no folder behind.
     let clock = Instant::now();
     let run = sim::start(plan.clone())?;
@@ -154,12 +176,12 @@ pub(super) fn watch_interrupts(flag: &Arc<AtomicBool>) {
         }
     });
     if let Err(e) = watching {
-        eprintln!("warning: interrupts end the program at once: {e}");
+        tell(format_args!("warning: interrupts end the program at once: {e}"));
     }
 }
 
 /// A run with everything it writes to.
-struct Session {
+pub(super) struct Session {
     plan: Arc<Plan>,
     run: Box<dyn Run>,
     folder: PathBuf,
@@ -167,6 +189,13 @@ struct Session {
     recording: Option<PathBuf>,
     logger: Option<Logger>,
     clock: Instant,
+    /// Seconds, and frames, of the parts of the run before this one.
+    before: (f64, Traffic, f64),
+    guard: Guard,
+    safety: Safety,
+    scene_hash: String,
+    /// Step of the last checkpoint.
+    kept: Option<u64>,
     interrupted: Arc<AtomicBool>,
     tally: Tally,
     rows: Vec<Row>,
@@ -199,57 +228,31 @@ impl Session {
         clock: Instant,
         interrupted: Arc<AtomicBool>,
     ) -> Result<Session, Failure> {
-        let cannot = |path: &Path, e: std::io::Error| {
-            Failure::Environment(format!("cannot write {}: {e}", path.display()))
-        };
         let recording = (!args.no_recording)
             .then(|| args.save.clone().unwrap_or_else(|| folder.join("recording.rrd")));
-        let mut sinks: Vec<Sink> = recording.iter().cloned().map(Sink::Save).collect();
-        if args.serve {
-            sinks.push(Sink::Serve { web_port: args.port, grpc_port: 0 });
-        }
-        sinks.extend(args.connect.clone().map(Sink::Connect));
-        sinks.extend(args.spawn.then_some(Sink::Spawn));
-        let name =
-            folder.file_name().map_or(plan.scene.name.clone(), |n| n.to_string_lossy().into());
-        let mut warnings: Vec<String> = plan.warnings.iter().map(ToString::to_string).collect();
-        let every = picture::thinning(plan, picture::drawn(plan, run.particles()).len());
-        if every > 1 && !sinks.is_empty() {
-            warnings.push(crate::plan::Warning::ParticlesThinned { every }.to_string());
-        }
-        for w in warnings.iter().filter(|_| !args.quiet) {
-            eprintln!("warning: {w}");
-        }
-        let logger = if sinks.is_empty() {
-            None
-        } else {
-            let log = RerunLog::open(&info::run_info(plan, &name), &sinks)
-                .inspect_err(|_| folder::abandon(&folder))?;
-            if let Some(url) = log.url() {
-                eprintln!("viewer: {url}");
-            }
-            let policy =
-                if recording.is_some() { Backpressure::Wait } else { Backpressure::DropOldest };
-            Some(Logger::start(log, policy).map_err(|e| {
-                Failure::Environment(format!("the logger thread cannot be started: {e}"))
-            })?)
-        };
+        let warnings: Vec<String> = plan.warnings.iter().map(ToString::to_string).collect();
+        let (logger, warnings) =
+            start_logger(args, plan, run.as_ref(), (&folder, recording.as_deref()), warnings)?;
         let scene_file = folder.join("scene.toml");
         std::fs::write(&scene_file, to_toml(&plan.scene)).map_err(|e| cannot(&scene_file, e))?;
         let series_file = folder.join("series.csv");
         let series =
             SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
-        let tally = Tally::new(run.row(), warnings);
         Ok(Session {
             plan: plan.clone(),
+            guard: Guard::new(args.safety.policy(), run.as_ref()),
+            safety: args.safety,
+            scene_hash: scene_hash(&plan.scene),
+            kept: None,
+            tally: Tally::new(run.row(), warnings),
             run,
             folder,
             series,
             recording,
             logger,
             clock,
+            before: (0.0, Traffic::default(), 0.0),
             interrupted,
-            tally,
             rows: Vec::new(),
             next_frame: 0,
             steps: args.steps,
@@ -260,8 +263,105 @@ impl Session {
         })
     }
 
+    /// Takes up the run of a folder at a state: the table goes on after its row, the recording after
+    /// its step.
+    pub(super) fn reopen(
+        args: &Args,
+        plan: &Arc<Plan>,
+        mut run: Box<dyn Run>,
+        folder: PathBuf,
+        state: &State,
+        interrupted: Arc<AtomicBool>,
+    ) -> Result<Session, Failure> {
+        let unfit = |e: StateError| Failure::Environment(e.to_string());
+        run.restore(state).map_err(unfit)?;
+        let row = run.row().clone();
+        let past = Past::load(state, &folder).map_err(unfit)?;
+        let (series, rows) = SeriesWriter::resume(&folder.join("series.csv"), plan, &row)
+            .map_err(|e| Failure::Environment(e.to_string()))?;
+        let (logger, warnings) = start_logger(
+            args,
+            plan,
+            run.as_ref(),
+            (&folder, past.recording.as_deref()),
+            past.warnings,
+        )?;
+        let mut next_frame = 0;
+        plan.frame_is_due(row.time, &mut next_frame);
+        let safety = args.safety.or(past.safety);
+        Ok(Session {
+            plan: plan.clone(),
+            guard: Guard::new(safety.policy(), run.as_ref()),
+            safety,
+            scene_hash: scene_hash(&plan.scene),
+            kept: Some(row.step),
+            tally: Tally { warnings, ..past.tally },
+            run,
+            folder,
+            series,
+            recording: past.recording,
+            logger,
+            clock: Instant::now(),
+            before: past.before,
+            interrupted,
+            rows,
+            next_frame,
+            steps: args.steps,
+            json: args.json,
+            profile: args.profile,
+            quiet: args.quiet,
+            bought: None,
+        })
+    }
+
+    /// Seconds since the run began, pauses between its parts left out.
+    fn wall(&self) -> f64 {
+        self.before.0 + self.clock.elapsed().as_secs_f64()
+    }
+
+    /// Frames of the whole run, and what the logger spent on them.
+    fn traffic(&self) -> (Traffic, f64) {
+        let (_, frames, busy) = self.before;
+        match &self.logger {
+            Some(logger) => {
+                let (now, spent) = logger.traffic();
+                (frames.and(now), busy + spent.as_secs_f64())
+            }
+            None => (frames, busy),
+        }
+    }
+
+    /// Brings table and recording to the disk, then the last good state.
+    fn checkpoint(&mut self) -> Result<(), Failure> {
+        if let Some(logger) = &mut self.logger
+            && logger.settle().is_err()
+        {
+            return Err(ended_early());
+        }
+        let table = self.folder.join("series.csv");
+        self.series.settle().map_err(|e| cannot(&table, e))?;
+        self.keep_state()
+    }
+
+    fn keep_state(&mut self) -> Result<(), Failure> {
+        let step = self.run.row().step;
+        let mut state = self.guard.good().clone();
+        Past {
+            tally: self.tally.clone(),
+            before: (self.wall(), self.traffic().0, self.traffic().1),
+            recording: self.recording.clone(),
+            warnings: self.tally.warnings.clone(),
+            safety: self.safety,
+        }
+        .save(&mut state, &self.folder);
+        checkpoint::write(&self.folder, step, &state, &self.scene_hash)
+            .map_err(|e| Failure::Environment(e.to_string()))?;
+        self.kept = Some(step);
+        Ok(())
+    }
+
     /// Runs on a thread of its own while this one shows progress; then closes all files.
-    fn go(mut self) -> Result<(), Failure> {
+    pub(super) fn go(mut self) -> Result<(), Failure> {
         let end = self.plan.clock.end * self.plan.units.time;
         let (sender, receiver) = bounded::<(u64, f64)>(1);
         let thread = std::thread::Builder::new()
@@ -296,21 +396,52 @@ impl Session {
 
     fn compute(&mut self, watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
         let outcome = self.steps(watch);
+        self.keep_the_end(&outcome);
         // A run that ends between two frames still shows where it ended.
         if let (Ok(Ending::StepLimit | Ending::Interrupted | Ending::BudgetSpent), Some(logger)) =
             (&outcome, &mut self.logger)
         {
-            let wall = self.clock.elapsed().as_secs_f64();
+            let row = self.run.row();
+            let (step, time_s, wall_s) =
+                (row.step, row.time, self.before.0 + self.clock.elapsed().as_secs_f64());
             let picture = Some(self.run.picture());
-            let frame = info::frame(&self.plan, self.run.row(), wall, picture, vec![]);
+            let frame = Frame { step, time_s, wall_s, picture, ..Frame::default() };
             // A logger that is gone says why when it is closed.
             let _ = logger.send(frame);
         }
         outcome
     }
 
+    /// A run that ends before its end leaves the last good state, to be looked at or resumed.
+    fn keep_the_end(&mut self, outcome: &Result<Ending, Failure>) {
+        let wanted = match outcome {
+            Ok(Ending::Finished) => false,
+            Ok(_) => !self.quiet,
+            Err(_) => true,
+        };
+        if !wanted || self.kept == Some(self.run.row().step) {
+            return;
+        }
+        // What failed may be the recording or the table: the state alone is worth keeping.
+        if let Err(e) = self.checkpoint().or_else(|_| self.keep_state())
+            && let Some(e) = describe(&e)
+        {
+            self.note(format!("the last state is not kept: {e}"));
+        }
+    }
+
+    fn note(&mut self, warning: String) {
+        if !self.quiet {
+            tell(format_args!("warning: {warning}"));
+        }
+        self.tally.warnings.push(warning);
+    }
+
     fn steps(&mut self, mut watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
-        self.observe(vec![])?;
+        self.guard.begin(self.run.as_ref())?;
+        if self.rows.is_empty() {
+            self.observe(vec![])?;
+        }
         watch(self.run.as_ref());
         while !self.run.is_finished() {
             if self.interrupted.load(Ordering::SeqCst) {
@@ -322,10 +453,18 @@ impl Session {
             if self.bought.as_ref().is_some_and(|b| b.is_spent(&self.clock, self.run.row().wall)) {
                 return Ok(Ending::BudgetSpent);
             }
-            self.run.step()?;
-            let events = self.run.events().to_vec();
+            let faults = self.guard.step(self.run.as_mut())?;
+            let mut events = self.run.events().to_vec();
+            for fault in faults {
+                self.note(fault.clone());
+                events.push(fault);
+            }
             self.observe(events)?;
             watch(self.run.as_ref());
+            let step = self.run.row().step;
+            if self.safety.checkpoint_every.is_some_and(|n| step.is_multiple_of(n)) {
+                self.checkpoint()?;
+            }
         }
         Ok(Ending::Finished)
     }
@@ -333,12 +472,8 @@ impl Session {
     /// Writes down the current state.
     fn observe(&mut self, mut notes: Vec<String>) -> Result<(), Failure> {
         let row = self.run.row().clone();
-        self.series.write(&row).map_err(|e| {
-            Failure::Environment(format!(
-                "cannot write {}: {e}",
-                self.folder.join("series.csv").display()
-            ))
-        })?;
+        let table = self.folder.join("series.csv");
+        self.series.write(&row).map_err(|e| cannot(&table, e))?;
         self.tally.add(&row);
         if let Some(logger) = &mut self.logger {
             let due = self.plan.frame_is_due(row.time, &mut self.next_frame);
@@ -346,10 +481,10 @@ impl Session {
                 notes.extend(self.tally.warnings.iter().cloned());
             }
             let picture = due.then(|| self.run.picture());
-            let wall = self.clock.elapsed().as_secs_f64();
+            let wall = self.before.0 + self.clock.elapsed().as_secs_f64();
             let frame: Frame = info::frame(&self.plan, &row, wall, picture, notes);
             if logger.send(frame).is_err() {
-                return Err(Failure::Environment("the recording ended early".into()));
+                return Err(ended_early());
             }
         }
         self.rows.push(row);
@@ -365,7 +500,7 @@ impl Session {
             print(&self.report(&ended.summary, ended.recorded))?;
         }
         if let (Some(served), None) = (&ended.served, &ended.failure) {
-            eprintln!("still serving {} (Ctrl-C ends)", served.url());
+            tell(format_args!("still serving {} (Ctrl-C ends)", served.url()));
             while !self.interrupted.load(Ordering::SeqCst) {
                 std::thread::sleep(std::time::Duration::from_millis(100));
             }
@@ -380,12 +515,12 @@ impl Session {
         let mut fault = None;
         if let Some(logger) = self.logger.take() {
             let (result, traffic, busy) = logger.finish();
-            self.tally.traffic = traffic;
-            self.tally.logger_seconds = busy.as_secs_f64();
+            self.tally.traffic = self.before.1.and(traffic);
+            self.tally.logger_seconds = self.before.2 + busy.as_secs_f64();
             match result {
                 Ok(done) => {
                     for notice in done.notices.iter().filter(|_| !self.quiet) {
-                        eprintln!("warning: {notice}");
+                        tell(format_args!("warning: {notice}"));
                     }
                     self.tally.warnings.extend(done.notices);
                     recorded = done.saved.first().map(|s| (s.path.clone(), s.bytes));
@@ -395,10 +530,10 @@ impl Session {
                 Err(e) => fault = Some(Failure::from(e)),
             }
         }
-        self.tally.wall = self.clock.elapsed().as_secs_f64();
+        self.tally.wall = self.wall();
         for w in self.run.warnings() {
             if !self.quiet {
-                eprintln!("warning: {w}");
+                tell(format_args!("warning: {w}"));
             }
             self.tally.warnings.push(w.to_string());
         }
@@ -470,10 +605,144 @@ impl Session {
             }
         }
         out += &format!("  folder: {}\n", self.folder.display());
+        if let (Some(step), true) = (self.kept, s.ending != Ending::Finished) {
+            let folder = self.folder.display();
+            out += &format!("  state of step {step} kept: grainscope resume {folder} goes on\n");
+        }
         if let Some((path, bytes)) = recorded {
             out += &format!("  recording: {} ({:.1} MB)\n", path.display(), bytes as f64 / 1e6);
         }
         out
+    }
+}
+
+fn cannot(path: &Path, e: std::io::Error) -> Failure {
+    Failure::Environment(format!("cannot write {}: {e}", path.display()))
+}
+
+fn ended_early() -> Failure {
+    Failure::Environment("the recording ended early".into())
+}
+
+/// Starts the logger of a run that stands at its first instant, or goes on after a later one; the
+/// warnings that there are then.
+fn start_logger(
+    args: &Args,
+    plan: &Plan,
+    run: &dyn Run,
+    (folder, recording): (&Path, Option<&Path>),
+    mut warnings: Vec<String>,
+) -> Result<(Option<Logger>, Vec<String>), Failure> {
+    let mut sinks: Vec<Sink> = recording.map(|p| Sink::Save(p.to_path_buf())).into_iter().collect();
+    if args.serve {
+        sinks.push(Sink::Serve { web_port: args.port, grpc_port: 0 });
+    }
+    sinks.extend(args.connect.clone().map(Sink::Connect));
+    sinks.extend(args.spawn.then_some(Sink::Spawn));
+    let name = folder.file_name().map_or(plan.scene.name.clone(), |n| n.to_string_lossy().into());
+    let step = run.row().step;
+    let every = picture::thinning(plan, picture::drawn(plan, run.particles()).len());
+    if every > 1 && !sinks.is_empty() && step == 0 {
+        warnings.push(crate::plan::Warning::ParticlesThinned { every }.to_string());
+    }
+    for w in warnings.iter().filter(|_| !args.quiet) {
+        tell(format_args!("warning: {w}"));
+    }
+    if sinks.is_empty() {
+        return Ok((None, warnings));
+    }
+    let about = info::run_info(plan, &name);
+    let mut last_step = None;
+    let log = if step == 0 {
+        RerunLog::open(&about, &sinks).inspect_err(|_| folder::abandon(folder))?
+    } else {
+        let resumed = RerunLog::resume(&about, &sinks, step)?;
+        if let Some(notice) = resumed.notice {
+            tell(format_args!("warning: {notice}"));
+            warnings.push(notice);
+        }
+        last_step = resumed.last_step;
+        resumed.log
+    };
+    if let Some(url) = log.url() {
+        tell(format_args!("viewer: {url}"));
+    }
+    let policy = if recording.is_some() { Backpressure::Wait } else { Backpressure::DropOldest };
+    let mut logger = Logger::start(log, policy)
+        .map_err(|e| Failure::Environment(format!("the logger thread cannot be started: {e}")))?;
+    if step > 0 && last_step != Some(step) {
+        // It ended before this step was recorded.
+        let wall = run.row().wall;
+        let frame = info::frame(plan, run.row(), wall, Some(run.picture()), vec![]);
+        logger.send(frame).map_err(|_| ended_early())?;
+    }
+    Ok((Some(logger), warnings))
+}
+
+/// What a checkpoint says of a run besides its state.
+struct Past {
+    tally: Tally,
+    /// Seconds, frames, seconds of the logger.
+    before: (f64, Traffic, f64),
+    recording: Option<PathBuf>,
+    warnings: Vec<String>,
+    safety: Safety,
+}
+
+impl Past {
+    fn save(&self, state: &mut State, folder: &Path) {
+        save_phases("session.phases", &self.tally.phases, state);
+        let (wall, traffic, busy) = self.before;
+        let t = &self.tally;
+        state.put_floats(
+            "session.numbers",
+            [
+                wall,
+                t.largest_power_error,
+                t.largest_divergence,
+                t.first_energy,
+                traffic.waited.as_secs_f64(),
+                busy,
+            ],
+        );
+        state.put_counts("session.frames", [traffic.frames, traffic.drops, traffic.waits]);
+        self.safety.save(state);
+        if let Some(recording) = &self.recording {
+            // The folder of a run may be moved; what lies elsewhere may not.
+            let inside = recording.strip_prefix(folder).map(Path::to_path_buf);
+            let path = inside.or_else(|_| std::path::absolute(recording));
+            let path = path.unwrap_or_else(|_| recording.clone());
+            state.put_bytes("session.recording", path.to_string_lossy().into_owned());
+        }
+        state.put_bytes("session.warnings", self.warnings.join("\n"));
+        state.put_bytes("session.program", env!("CARGO_PKG_VERSION"));
+    }
+
+    fn load(state: &State, folder: &Path) -> Result<Past, StateError> {
+        let [wall, power, divergence, energy, waited, busy] = state.numbers("session.numbers")?;
+        let [frames, drops, waits] = state.tally("session.frames")?;
+        let waited = Duration::try_from_secs_f64(waited).unwrap_or_default();
+        let traffic = Traffic { frames, drops, waits, waited };
+        let recording = match state.try_bytes("session.recording") {
+            Some(_) => Some(folder.join(state.text("session.recording")?)),
+            None => None,
+        };
+        Ok(Past {
+            tally: Tally {
+                phases: load_phases("session.phases", state)?,
+                wall,
+                largest_power_error: power,
+                largest_divergence: divergence,
+                first_energy: energy,
+                traffic,
+                logger_seconds: busy,
+                warnings: vec![],
+            },
+            before: (wall, traffic, busy),
+            recording,
+            warnings: state.text("session.warnings")?.lines().map(String::from).collect(),
+            safety: Safety::load(state)?,
+        })
     }
 }
 

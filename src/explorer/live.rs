@@ -9,6 +9,7 @@ use crate::plan::{Plan, When};
 use crate::record::info;
 use crate::record::summary::Tally;
 use crate::scene::SceneError;
+use crate::sim::guard::{Guard, Policy};
 use crate::sim::row::{Phases, Row};
 use crate::sim::{self, Run, SimError, picture};
 use std::collections::VecDeque;
@@ -37,6 +38,9 @@ pub struct Live {
     /// Of the draft: what a new run would be.
     pub values: Plan,
     pub run: Box<dyn Run>,
+    guard: Guard,
+    /// What the guard had to note about the last step.
+    faults: Vec<String>,
     pub plan: Arc<Plan>,
     pub info: RunInfo,
     pub film: Film,
@@ -80,6 +84,8 @@ impl Live {
             drawn: None,
             drawing: Duration::ZERO,
             ends: VecDeque::new(),
+            guard: Guard::new(Policy::default(), run.as_ref()),
+            faults: vec![],
             run,
             plan,
         })
@@ -88,7 +94,7 @@ impl Live {
     /// Takes a step. What happened in it is in the events of the run.
     pub fn step(&mut self) -> Result<(), SimError> {
         let clock = Instant::now();
-        self.run.step()?;
+        self.faults = self.guard.step(self.run.as_mut())?;
         self.computing += clock.elapsed();
         if self.ends.len() > MEAN_OVER {
             self.ends.pop_front();
@@ -114,6 +120,7 @@ impl Live {
         let row = self.run.row().clone();
         self.tally.add(&row);
         let mut notes = self.run.events().to_vec();
+        notes.append(&mut self.faults);
         if row.step == 0 {
             notes.extend(self.tally.warnings.iter().cloned());
         }

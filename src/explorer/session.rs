@@ -670,5 +670,6 @@ fn limited_by(limiter: Limiter) -> &'static str {
         Limiter::Relaxation => "relaxation of the strata",
         Limiter::Growth => "growth of the step",
         Limiter::Stop => "the next frame or change",
+        Limiter::Guard => "a longer step that failed",
     }
 }

@@ -71,6 +71,9 @@ fn make(folder: &Path, force: bool) -> Result<PathBuf, FolderError> {
                 _ => {}
             }
         }
+        for (_, path) in super::checkpoint::list(folder) {
+            std::fs::remove_file(path).map_err(fault)?;
+        }
     }
     // Find out now, not after an hour, whether files can be made here.
     let probe = folder.join(".grainscope-probe");

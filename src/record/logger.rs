@@ -33,23 +33,42 @@ pub struct Traffic {
 /// Handle of the logger thread.
 pub struct Logger {
     policy: Backpressure,
-    sender: Sender<Frame>,
+    sender: Sender<Item>,
     /// The other end, to take the oldest frame out; only for [`Backpressure::DropOldest`], since
     /// the channel never closes while it exists.
-    oldest: Option<Receiver<Frame>>,
+    oldest: Option<Receiver<Item>>,
     thread: JoinHandle<Result<Finished, RecordError>>,
     busy_ns: Arc<AtomicU64>,
     traffic: Traffic,
+}
+
+/// What the thread is asked to do.
+enum Item {
+    Frame(Box<Frame>),
+    /// Bring everything so far to the disk, and say so.
+    Settle(Sender<()>),
 }
 
 /// The logger ended early; [`Logger::finish`] says why.
 #[derive(Debug)]
 pub struct LoggerGone;
 
+impl Traffic {
+    /// That of two parts of a run.
+    pub fn and(self, o: Traffic) -> Traffic {
+        Traffic {
+            frames: self.frames + o.frames,
+            drops: self.drops + o.drops,
+            waits: self.waits + o.waits,
+            waited: self.waited + o.waited,
+        }
+    }
+}
+
 impl Logger {
     /// Starts the thread on an open recording.
     pub fn start(log: RerunLog, policy: Backpressure) -> std::io::Result<Logger> {
-        let (sender, receiver) = bounded::<Frame>(CAPACITY);
+        let (sender, receiver) = bounded::<Item>(CAPACITY);
         let oldest = (policy == Backpressure::DropOldest).then(|| receiver.clone());
         let busy_ns = Arc::new(AtomicU64::new(0));
         let busy = busy_ns.clone();
@@ -57,9 +76,16 @@ impl Logger {
             let mut log = log;
             // Ends when the sender is dropped. A fault ends it at once and closes the channel: the
             // simulation hears of it with its next frame.
-            for frame in receiver {
+            for item in receiver {
                 let clock = Instant::now();
-                log.frame(&frame)?;
+                match item {
+                    Item::Frame(frame) => log.frame(&frame)?,
+                    Item::Settle(done) => {
+                        log.settle()?;
+                        // Nobody waits any more if this fails.
+                        let _ = done.send(());
+                    }
+                }
                 busy.fetch_add(clock.elapsed().as_nanos() as u64, Ordering::Relaxed);
             }
             log.finish()
@@ -69,7 +95,7 @@ impl Logger {
 
     pub fn send(&mut self, frame: Frame) -> Result<(), LoggerGone> {
         self.traffic.frames += 1;
-        match self.sender.try_send(frame) {
+        match self.sender.try_send(Item::Frame(Box::new(frame))) {
             Ok(()) => Ok(()),
             Err(TrySendError::Disconnected(_)) => Err(LoggerGone),
             Err(TrySendError::Full(mut frame)) => match self.policy {
@@ -96,6 +122,22 @@ impl Logger {
                 },
             },
         }
+    }
+
+    /// How often the two threads have met so far, and how long this one was busy.
+    pub fn traffic(&self) -> (Traffic, Duration) {
+        (self.traffic, Duration::from_nanos(self.busy_ns.load(Ordering::Relaxed)))
+    }
+
+    /// Waits until everything sent so far is on the disk. Where frames may be dropped nothing is kept
+    /// there.
+    pub fn settle(&mut self) -> Result<(), LoggerGone> {
+        if self.policy == Backpressure::DropOldest {
+            return Ok(());
+        }
+        let (done, settled) = bounded(1);
+        self.sender.send(Item::Settle(done)).map_err(|_| LoggerGone)?;
+        settled.recv().map_err(|_| LoggerGone)
     }
 
     /// Waits until everything is recorded.

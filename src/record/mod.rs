@@ -1,5 +1,6 @@
 //! From frames to what people look at: the logger thread, recordings, tables and plots.
 
+pub mod checkpoint;
 pub mod color;
 pub mod folder;
 pub mod info;

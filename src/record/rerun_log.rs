@@ -17,6 +17,7 @@
 
 mod bar;
 mod blueprint;
+mod mend;
 mod race;
 mod read;
 mod side_by_side;
@@ -32,6 +33,7 @@ use rerun::archetypes;
 use rerun::components::{Color, MagnificationFilter, Radius};
 use rerun::{EntityPath, EntityPathPart, RecordingStream};
 
+pub use mend::{Kept, RepairError, Resumed, repair};
 pub use race::Race;
 pub use read::{ReadError, Recorded, Sample};
 pub use side_by_side::{Difference, RecordedRun, SideBySide};

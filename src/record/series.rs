@@ -1,14 +1,18 @@
 //! `series.csv`: one row a step, SI units.
 
 use crate::plan::Plan;
-use crate::sim::row::Row;
+use crate::sim::clock::Limiter;
+use crate::sim::empty_row;
+use crate::sim::row::{GaugeRow, Row};
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
 
 /// The table in the making; each row is flushed, so a killed run leaves whole rows.
 pub struct SeriesWriter {
-    out: BufWriter<File>,
+    out: File,
+    /// Bytes of whole rows.
+    length: u64,
     /// There is a column of the mean alignment.
     alignment: bool,
 }
@@ -61,10 +65,49 @@ pub fn columns(plan: &Plan) -> Vec<String> {
 
 impl SeriesWriter {
     pub fn create(path: &Path, plan: &Plan) -> std::io::Result<Self> {
-        let mut out = BufWriter::new(File::create(path)?);
-        writeln!(out, "{}", columns(plan).join(","))?;
-        out.flush()?;
-        Ok(SeriesWriter { out, alignment: plan.effects.directors })
+        let mut series =
+            SeriesWriter { out: File::create(path)?, length: 0, alignment: plan.effects.directors };
+        series.append(&format!("{}\n", columns(plan).join(",")))?;
+        Ok(series)
+    }
+
+    /// Goes on with a table after a row: what it holds of later steps is dropped, what it holds of
+    /// earlier ones is given. The row itself may be missing: it is known.
+    pub fn resume(path: &Path, plan: &Plan, row: &Row) -> Result<(Self, Vec<Row>), ResumeError> {
+        let step = row.step;
+        let fault = |source| ResumeError::File { path: path.to_path_buf(), source };
+        let text = std::fs::read_to_string(path).map_err(fault)?;
+        let (mut rows, length) = whole_rows(&text, plan, step)
+            .map_err(|(line, what)| ResumeError::Row { path: path.to_path_buf(), line, what })?;
+        if (rows.len() as u64) < step {
+            let path = path.to_path_buf();
+            return Err(ResumeError::Short { path, rows: rows.len(), step });
+        }
+        let mut out = File::options().write(true).open(path).map_err(fault)?;
+        out.set_len(length).map_err(fault)?;
+        out.seek(SeekFrom::End(0)).map_err(fault)?;
+        let mut series = SeriesWriter { out, length, alignment: plan.effects.directors };
+        if rows.len() as u64 == step {
+            series.write(row).map_err(fault)?;
+            rows.push(row.clone());
+        }
+        Ok((series, rows))
+    }
+
+    /// Adds a line, all of it or nothing.
+    fn append(&mut self, line: &str) -> std::io::Result<()> {
+        if let Err(e) = self.out.write_all(line.as_bytes()) {
+            // A full disk may have taken a part.
+            self.out.set_len(self.length)?;
+            return Err(e);
+        }
+        self.length += line.len() as u64;
+        Ok(())
+    }
+
+    /// Brings the table to the disk.
+    pub fn settle(&mut self) -> std::io::Result<()> {
+        self.out.sync_data()
     }
 
     pub fn write(&mut self, row: &Row) -> std::io::Result<()> {
@@ -107,7 +150,95 @@ impl SeriesWriter {
             line += &format!(",{d:e}");
         }
         line.push('\n');
-        self.out.write_all(line.as_bytes())?;
-        self.out.flush()
+        self.append(&line)
     }
+}
+
+/// Why a table cannot be taken up again.
+#[derive(Debug, thiserror::Error)]
+pub enum ResumeError {
+    #[error("{}: {source}", path.display())]
+    File { path: PathBuf, source: std::io::Error },
+    #[error("{}: line {line}: {what}", path.display())]
+    Row { path: PathBuf, line: usize, what: String },
+    #[error("{}: holds {rows} whole rows, and lacks those before step {step}", path.display())]
+    Short { path: PathBuf, rows: usize, step: u64 },
+}
+
+/// Rows of a table up to a step, and the bytes that they take. What is wrong, and in which line,
+/// if it is no such table; a last line that is cut does not count.
+fn whole_rows(text: &str, plan: &Plan, until: u64) -> Result<(Vec<Row>, u64), (usize, String)> {
+    let names = columns(plan);
+    let mut lines = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
+    let header = lines.next().unwrap_or_default();
+    if header.trim_end() != names.join(",") {
+        return Err((1, "the columns are not those of this run".into()));
+    }
+    let (mut rows, mut length) = (Vec::new(), header.len() as u64);
+    for (k, line) in lines.enumerate() {
+        if k as u64 > until {
+            break;
+        }
+        let row = parse(line.trim_end(), &names, plan).map_err(|what| (k + 2, what))?;
+        if row.step != k as u64 {
+            return Err((k + 2, format!("is the row of step {}, where {k} belongs", row.step)));
+        }
+        rows.push(row);
+        length += line.len() as u64;
+    }
+    Ok((rows, length))
+}
+
+/// A row of the table; phases are not in it.
+fn parse(line: &str, names: &[String], plan: &Plan) -> Result<Row, String> {
+    let values: Vec<&str> = line.split(',').collect();
+    if values.len() != names.len() {
+        return Err(format!("{} values, where {} belong", values.len(), names.len()));
+    }
+    let mut row = empty_row(plan);
+    row.gauges = plan.gauges.iter().map(|_| GaugeRow { volume: 0.0, rate: 0.0 }).collect();
+    let (mut gauges, mut drifts) = (0, 0);
+    for (name, &text) in names.iter().zip(&values) {
+        let number = || text.parse::<f64>().map_err(|_| format!("{name}: `{text}` is no number"));
+        let count = || text.parse::<u64>().map_err(|_| format!("{name}: `{text}` is no count"));
+        match name.as_str() {
+            "step" => row.step = count()?,
+            "time" => row.time = number()?,
+            "dt" => row.dt = number()?,
+            "dt_limiter" => {
+                let limiter = Limiter::ALL.into_iter().find(|l| l.name() == text);
+                row.dt_limiter = limiter.ok_or_else(|| format!("{name}: no limiter `{text}`"))?;
+            }
+            "wall" => row.wall = number()?,
+            "power_in" => row.power_in = number()?,
+            "dissipation" => row.dissipation = number()?,
+            "power_error" => row.power_error = number()?,
+            "divergence_error" => row.divergence_error = number()?,
+            "volume_error" => row.volume_error = number()?,
+            "iterations" => row.iterations = count()? as u32,
+            "particles" => row.particles = count()? as usize,
+            "max_speed" => row.max_speed = number()?,
+            "rms_speed" => row.rms_speed = number()?,
+            "stabilisation" => row.stabilisation = number()?,
+            "potential_energy" => row.potential_energy = number()?,
+            "work" => row.work = number()?,
+            "dissipated" => row.dissipated = number()?,
+            "director_error" => row.director_error = number()?,
+            "active_rotation" => row.active_rotation = count()? as usize,
+            "splits" => row.splits = count()?,
+            "merges" => row.merges = count()?,
+            "held" => row.held = count()?,
+            "mean_alignment" => row.alignment = Some(number()?).filter(|a| !a.is_nan()),
+            other if other.ends_with("outflow_volume") => row.gauges[gauges].volume = number()?,
+            other if other.ends_with("outflow_rate") => {
+                row.gauges[gauges].rate = number()?;
+                gauges += 1;
+            }
+            _ => {
+                row.drift[drifts] = number()?;
+                drifts += 1;
+            }
+        }
+    }
+    Ok(row)
 }

@@ -21,9 +21,23 @@ pub enum Limiter {
     Growth,
     /// A frame, a scheduled change or the end had to be met.
     Stop,
+    /// The step was cut because a longer one failed.
+    Guard,
 }
 
 impl Limiter {
+    /// All limiters; states of runs number them by their place here: new ones go to the end.
+    pub const ALL: [Limiter; 8] = [
+        Limiter::Start,
+        Limiter::Courant,
+        Limiter::Strain,
+        Limiter::MaxStep,
+        Limiter::Relaxation,
+        Limiter::Growth,
+        Limiter::Stop,
+        Limiter::Guard,
+    ];
+
     pub fn name(self) -> &'static str {
         match self {
             Limiter::Start => "start",
@@ -33,6 +47,7 @@ impl Limiter {
             Limiter::Relaxation => "relaxation",
             Limiter::Growth => "growth",
             Limiter::Stop => "stop",
+            Limiter::Guard => "guard",
         }
     }
 }

@@ -33,11 +33,13 @@ pub struct Unfilled {
 /// Fills every cell; sorted.
 pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
     let effects = &plan.effects;
-    let mut out = Particles::default();
-    out.director = effects.directors.then(Vec::new);
-    out.viscosity = effects.carried_viscosity.then(Vec::new);
-    out.density = effects.carried_density.then(Vec::new);
-    out.mark = (!plan.marks.is_empty()).then(Vec::new);
+    let mut out = Particles {
+        director: effects.directors.then(Vec::new),
+        viscosity: effects.carried_viscosity.then(Vec::new),
+        density: effects.carried_density.then(Vec::new),
+        mark: (!plan.marks.is_empty()).then(Vec::new),
+        ..Particles::default()
+    };
     let mesh = &plan.mesh;
     let places = places(plan);
     let start: f64 = plan.method.seeding.random(usize::MAX).random();

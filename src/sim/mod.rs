@@ -12,11 +12,14 @@
 //! ```
 
 pub mod clock;
+mod examine;
+pub mod guard;
 pub mod initial;
 mod measure;
 pub mod picture;
 pub mod row;
 mod sampling;
+pub mod state;
 
 use crate::motion::advect;
 use crate::motion::carrier::Carrier;
@@ -35,8 +38,11 @@ use crate::space::neighbours::{Face, Neighbours, open_faces};
 use crate::space::particles::Particles;
 use crate::space::population::{Count, Population};
 use clock::{Limiter, next_step};
+pub use examine::{Fault, Place};
 use initial::Unfilled;
+pub use measure::empty_row;
 use row::{Phases, Row};
+use state::{State, StateError};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -51,12 +57,32 @@ pub enum SimError {
     Solve { step: u64, time: f64, source: SolveError },
     #[error("step {step}, t = {time:.6e} s: the time step has become {dt:.1e} s")]
     Step { step: u64, time: f64, dt: f64 },
+    /// The step was taken, but its result cannot be.
+    #[error("step {step}, t = {time:.6e} s: {fault}")]
+    Fault { step: u64, time: f64, fault: Fault },
+    /// Shorter steps do not help either.
+    #[error("{source}; the {}", tried(*.cuts))]
+    Cut {
+        cuts: u32,
+        #[source]
+        source: Box<SimError>,
+    },
+}
+
+/// What was tried before a run was given up.
+fn tried(cuts: u32) -> String {
+    format!("step was taken again {cuts} times, ever shorter, and failed each time")
 }
 
 impl SimError {
     /// The field went to infinity or not-a-number.
     pub fn is_non_finite(&self) -> bool {
-        matches!(self, SimError::Solve { source: SolveError::NonFinite { .. }, .. })
+        match self {
+            SimError::Solve { source: SolveError::NonFinite { .. }, .. } => true,
+            SimError::Fault { fault, .. } => fault.is_non_finite(),
+            SimError::Cut { source, .. } => source.is_non_finite(),
+            _ => false,
+        }
     }
 
     /// What the user can do about it.
@@ -82,6 +108,8 @@ impl SimError {
                 "likely cause: a speed that grows without bound; look at the last frames, and \
                  lower accuracy.cells or the contrast"
             }
+            SimError::Fault { fault, .. } => fault.remedy(),
+            SimError::Cut { source, .. } => source.remedy(),
         }
     }
 }
@@ -94,14 +122,16 @@ pub struct Simulation<const D: usize> {
     plan: Arc<Plan>,
     stokes: Stokes<D>,
     quadrature: Quadrature,
+    /// Of [`Quadrature::factors`]: those that its points were made with.
+    factors_of_points: Vec<f64>,
     weight: Weight,
     restoring: Restoring,
     /// Those that restoring terms may lie on; none where no scene calls for them.
     restoring_faces: Vec<Face>,
     particles: Particles,
     flow: Flow<D>,
-    /// Velocity of the solution before, and the step between the two.
-    previous: Option<(Vec<[f64; 2]>, f64)>,
+    /// The solution before; none at the start and after a sudden change.
+    previous: Option<Before<D>>,
     /// Nodal forces that do not change: tractions and fixed body forces.
     fixed_load: Vec<[f64; D]>,
     load: Vec<[f64; D]>,
@@ -123,6 +153,10 @@ pub struct Simulation<const D: usize> {
     row: Row,
     report: Report,
     events: Vec<String>,
+    /// No step may be longer (SI); see [`Run::limit_step`].
+    longest: Option<f64>,
+    /// The step that is being taken, or was.
+    attempted: f64,
 }
 
 /// A run whose number of unknowns per node was decided by its plan.
@@ -157,6 +191,23 @@ pub trait Run: Send {
     fn changes_applied(&self) -> usize;
     /// Goes on with another plan, made by [`Plan::with_change`]: the two share all that lies behind.
     fn replan(&mut self, plan: Arc<Plan>);
+    /// Everything that the next step depends on.
+    fn state(&self) -> State;
+    /// Goes on from a state of a run of the same plan, to the last bit as that one would.
+    fn restore(&mut self, state: &State) -> Result<(), StateError>;
+    /// Steps may be no longer than this (s) until told otherwise.
+    fn limit_step(&mut self, longest: Option<f64>);
+    /// Length of the step that was taken or tried last, s.
+    fn attempted_step(&self) -> f64;
+    /// The first thing about the present state that cannot be.
+    fn examine(&self) -> Result<(), Fault>;
+}
+
+/// The solution before the current one, and the step between them.
+#[derive(Clone)]
+struct Before<const D: usize> {
+    flow: Flow<D>,
+    dt: f64,
 }
 
 /// Velocity and rotation (zero if none is solved) of a flow, m/s and 1/s, at an SI point.
@@ -227,6 +278,9 @@ impl<const D: usize> Simulation<D> {
             row: measure::empty_row(&plan),
             report: Report::default(),
             events: vec![],
+            longest: None,
+            attempted: 0.0,
+            factors_of_points: vec![],
             particles,
             stokes,
             plan,
@@ -252,9 +306,15 @@ impl<const D: usize> Simulation<D> {
         let mut seconds = Phases::default();
         let speeds = self.speeds();
         let (mut dt, mut limiter) =
-            next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.1), speeds);
+            next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.dt), speeds);
+        if let Some(longest) = self.longest.map(|dt| dt / self.plan.units.time)
+            && dt > longest
+        {
+            (dt, limiter) = (longest, Limiter::Guard);
+        }
         let mut extra = 0;
         let half = loop {
+            self.attempted = dt;
             if dt.is_nan() || self.time + dt <= self.time {
                 let dt = dt * self.plan.units.time;
                 return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
@@ -299,11 +359,14 @@ impl<const D: usize> Simulation<D> {
         self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
         self.step += 1;
         let changed = self.apply_changes();
-        let before = self.flow.translation();
-        // After a sudden change the velocity before says nothing about the one to come.
+        let before = self.flow.clone();
+        // After a sudden change the flow before says nothing about the one to come.
         let ahead = (!changed).then(|| self.ahead(self.expected_step(dt)));
-        self.solve(ahead.flatten().map(|t| (t, before.clone())), &mut seconds)?;
-        self.previous = (!changed).then_some((before, dt));
+        if let (Some(previous), false) = (&self.previous, changed) {
+            self.flow.extrapolate(&previous.flow, dt / previous.dt);
+        }
+        self.solve(ahead.flatten().map(|t| (t, before.translation())), &mut seconds)?;
+        self.previous = (!changed).then_some(Before { flow: before, dt });
         self.measure(dt, limiter, seconds, extra + self.report.corrections, clock);
         Ok(())
     }
@@ -340,11 +403,11 @@ impl<const D: usize> Simulation<D> {
         let now = self.flow.translation();
         match (self.plan.method.integrator, &self.previous) {
             (Integrator::Euler, _) => Ok((now, 0)),
-            (Integrator::Extrapolated, Some((before, dt_before))) => {
-                let f = 0.5 * dt / dt_before;
+            (Integrator::Extrapolated, Some(before)) => {
+                let f = 0.5 * dt / before.dt;
                 let half = now
                     .iter()
-                    .zip(before)
+                    .zip(&before.flow.velocity)
                     .map(|(u, b)| [u[0] + f * (u[0] - b[0]), u[1] + f * (u[1] - b[1])])
                     .collect();
                 Ok((half, 0))
@@ -435,6 +498,7 @@ impl<const D: usize> Simulation<D> {
         let plan = self.plan.clone();
         let phase = Instant::now();
         let (step, time) = (self.step, self.si_time());
+        self.factors_of_points = self.quadrature.factors().to_vec();
         self.quadrature
             .update(&plan.mesh, &self.particles, &self.matter.materials, self.version)
             .map_err(|mut source| {
@@ -587,5 +651,20 @@ impl<const D: usize> Run for Simulation<D> {
     }
     fn replan(&mut self, plan: Arc<Plan>) {
         self.plan = plan;
+    }
+    fn state(&self) -> State {
+        self.save()
+    }
+    fn restore(&mut self, state: &State) -> Result<(), StateError> {
+        self.load(state)
+    }
+    fn limit_step(&mut self, longest: Option<f64>) {
+        self.longest = longest;
+    }
+    fn attempted_step(&self) -> f64 {
+        self.attempted * self.plan.units.time
+    }
+    fn examine(&self) -> Result<(), Fault> {
+        self.find_fault()
     }
 }

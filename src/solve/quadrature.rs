@@ -200,6 +200,11 @@ impl Quadrature {
         &self.factors
     }
 
+    /// Goes back to the factors of an earlier state.
+    pub fn set_factors(&mut self, factors: &[f64]) {
+        self.factors.copy_from_slice(factors);
+    }
+
     /// Area of a material as the solver sees it.
     pub fn projected_area(&self, mesh: &Mesh, material: usize) -> f64 {
         (0..mesh.cells()).map(|c| self.fraction(c, material) * mesh.cell_area(c)).sum()

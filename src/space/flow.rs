@@ -35,6 +35,15 @@ impl<const D: usize> Flow<D> {
         a + b * xi + c * eta
     }
 
+    /// Goes on by `share` of the change since an earlier flow.
+    pub fn extrapolate(&mut self, earlier: &Flow<D>, share: f64) {
+        let go_on = |now: &mut f64, before: &f64| *now += share * (*now - before);
+        let velocity = self.velocity.as_flattened_mut().iter_mut();
+        velocity.zip(earlier.velocity.as_flattened()).for_each(|(now, before)| go_on(now, before));
+        let pressure = self.pressure.as_flattened_mut().iter_mut();
+        pressure.zip(earlier.pressure.as_flattened()).for_each(|(now, before)| go_on(now, before));
+    }
+
     /// The velocity alone, for what moves with it.
     pub fn translation(&self) -> Vec<[f64; 2]> {
         self.velocity.iter().map(|u| [u[0], u[1]]).collect()

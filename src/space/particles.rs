@@ -24,7 +24,7 @@ pub struct Particles {
     pub mark: Column<bool>,
     /// First particle of each cell, one more at the end; valid after [`Particles::sort`].
     pub cell_start: Vec<u32>,
-    sorting: Sorting,
+    pub(crate) sorting: Sorting,
 }
 
 /// Particles that are worth a task of their own.
@@ -32,7 +32,7 @@ const GRAIN: usize = 4096;
 
 /// Room that sorting takes, kept from one time to the next.
 #[derive(Clone, Debug, Default)]
-struct Sorting {
+pub(crate) struct Sorting {
     cells: Vec<u32>,
     next: Vec<u32>,
     order: Vec<u32>,

@@ -3,9 +3,14 @@
 mod commands;
 mod compare;
 mod cost;
+mod environment;
+mod hostile;
+mod killed;
 mod recording;
 mod refusals;
+mod resume;
 mod runs;
+mod soak;
 mod stress;
 mod sweep;
 

@@ -65,6 +65,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 pub(super) struct RrdFile {
     path: PathBuf,
     encoder: Arc<Mutex<Encoder<File>>>,
+    /// The same file, to bring it to the disk.
+    handle: Arc<File>,
     fault: Fault,
 }
 
@@ -72,12 +74,14 @@ impl RrdFile {
     pub(super) fn create(path: &Path) -> Result<Self, RecordError> {
         let failed = |cause: String| RecordError::Write { path: path.to_owned(), cause };
         let file = File::create(path).map_err(|e| failed(e.to_string()))?;
+        let handle = file.try_clone().map_err(|e| failed(e.to_string()))?;
         let encoder =
             Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, file)
                 .map_err(|e| failed(e.to_string()))?;
         Ok(Self {
             path: path.to_owned(),
             encoder: Arc::new(Mutex::new(encoder)),
+            handle: Arc::new(handle),
             fault: Fault::default(),
         })
     }
@@ -101,8 +105,30 @@ impl RrdFile {
         let mut encoder = lock(&self.encoder);
         encoder.finish().map_err(|e| failed(e.to_string()))?;
         encoder.flush_blocking().map_err(|e| failed(e.to_string()))?;
-        let size = std::fs::metadata(&self.path).map_err(|e| failed(e.to_string()))?;
+        self.finished()
+    }
+
+    /// The file as it is now.
+    pub(super) fn finished(&self) -> Result<Saved, RecordError> {
+        let size = std::fs::metadata(&self.path).map_err(|e| self.failed(&e.to_string()))?;
         Ok(Saved { path: self.path.clone(), bytes: size.len() })
+    }
+
+    /// Brings what was sent to the disk, and the file to its final place.
+    pub(super) fn settle(&mut self, place: Option<&Path>) -> Result<(), RecordError> {
+        self.check()?;
+        let encoder = lock(&self.encoder).flush_blocking();
+        encoder.map_err(|e| self.failed(&e.to_string()))?;
+        self.handle.sync_data().map_err(|e| self.failed(&e.to_string()))?;
+        if let Some(place) = place {
+            std::fs::rename(&self.path, place).map_err(|e| self.failed(&e.to_string()))?;
+            self.path = place.to_owned();
+        }
+        Ok(())
+    }
+
+    fn failed(&self, cause: &str) -> RecordError {
+        RecordError::Write { path: self.path.clone(), cause: cause.to_owned() }
     }
 }
 

@@ -1,0 +1,121 @@
+//! `grainscope doctor`: what a bug report needs.
+
+use super::memory::{available, size};
+use super::{Failure, print};
+use crate::cost::Machine;
+use crate::record::checkpoint;
+use indexmap::IndexMap;
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::PathBuf;
+use std::process::Command;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder whose disk is asked about
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    dir: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let facts = facts(args);
+    if args.json {
+        let text = serde_json::to_string_pretty(&facts);
+        return print(&text.map_err(|e| Failure::Environment(e.to_string()))?);
+    }
+    let width = facts.keys().map(|k| k.len()).max().unwrap_or(0);
+    let lines: Vec<String> = facts.iter().map(|(k, v)| format!("{k:<width$}  {v}")).collect();
+    print(&lines.join("\n"))
+}
+
+fn facts(args: &Args) -> IndexMap<&'static str, String> {
+    let machine = Machine::here();
+    let mut system = sysinfo::System::new();
+    system.refresh_memory();
+    let memory = format!(
+        "{} in all, {} left for this program",
+        size(system.total_memory() as f64),
+        available().map_or("unknown".into(), size)
+    );
+    let system = sysinfo::System::long_os_version().unwrap_or_else(|| "unknown".into());
+    [
+        ("grainscope", env!("CARGO_PKG_VERSION").to_string()),
+        ("recordings", "rerun 0.36.3".to_string()),
+        ("checkpoints", format!("format {}", checkpoint::FORMAT)),
+        ("system", format!("{system}, {}", std::env::consts::ARCH)),
+        ("processor", machine.processor),
+        ("features", processor_features().join(" ")),
+        ("threads", threads()),
+        ("memory", memory),
+        ("disk", disk(args)),
+        ("folder", folder(args)),
+        ("viewer", viewer()),
+        ("ports", ports()),
+    ]
+    .into_iter()
+    .collect()
+}
+
+/// What decides which instructions are used, and so the last bits of results.
+fn processor_features() -> Vec<&'static str> {
+    let mut found = Vec::new();
+    #[cfg(target_arch = "x86_64")]
+    {
+        let all = [
+            ("sse4.2", std::arch::is_x86_feature_detected!("sse4.2")),
+            ("avx", std::arch::is_x86_feature_detected!("avx")),
+            ("avx2", std::arch::is_x86_feature_detected!("avx2")),
+            ("fma", std::arch::is_x86_feature_detected!("fma")),
+            ("avx512f", std::arch::is_x86_feature_detected!("avx512f")),
+        ];
+        found.extend(all.into_iter().filter(|f| f.1).map(|f| f.0));
+    }
+    #[cfg(target_arch = "aarch64")]
+    found.push("neon");
+    found
+}
+
+fn threads() -> String {
+    std::thread::available_parallelism().map_or("unknown".into(), |n| n.to_string())
+}
+
+/// Free space, as `df` has it.
+fn disk(args: &Args) -> String {
+    let said = Command::new("df").arg("-Pk").arg(&args.dir).output();
+    let text = said.map(|o| String::from_utf8_lossy(&o.stdout).into_owned()).unwrap_or_default();
+    let line = text.lines().nth(1).map(|l| l.split_whitespace().collect::<Vec<_>>());
+    let free = line.as_ref().and_then(|l| l.get(3)?.parse::<f64>().ok());
+    free.map_or("unknown".into(), |kb| format!("{} free", size(kb * 1024.0)))
+}
+
+/// Whether files can be made there.
+fn folder(args: &Args) -> String {
+    let probe = args.dir.join(".grainscope-probe");
+    let shown = std::path::absolute(&args.dir).unwrap_or_else(|_| args.dir.clone());
+    match std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)) {
+        Ok(()) => format!("{}: can be written", shown.display()),
+        Err(e) => format!("{}: cannot be written: {e}", shown.display()),
+    }
+}
+
+fn viewer() -> String {
+    let inside = "inside the program (--serve)";
+    match Command::new("rerun").arg("--version").output() {
+        Ok(said) if said.status.success() => {
+            let version = String::from_utf8_lossy(&said.stdout);
+            format!("{inside}; on the path: {}", version.lines().next().unwrap_or_default())
+        }
+        _ => format!("{inside}; no `rerun` on the path for --spawn"),
+    }
+}
+
+/// Whether the ports of pages and data can be had.
+fn ports() -> String {
+    let free = |port| match TcpListener::bind((Ipv4Addr::LOCALHOST, port)) {
+        Ok(_) => "free".to_string(),
+        Err(e) => e.to_string(),
+    };
+    format!("any: {}; 9876 (rerun's own): {}", free(0), free(9876))
+}

@@ -1,0 +1,92 @@
+//! `grainscope resume`: goes on with a run that ended before its end, for whatever reason.
+
+use super::run::{self, Session};
+use super::safety::Safety;
+use super::{Failure, print, tell};
+use crate::record::checkpoint;
+use crate::scene::{self, scene_hash};
+use crate::sim;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Go on with a run that ended before its end, for whatever reason.
+///
+/// The run goes on from its newest good checkpoint as if it had never stopped: state, table and
+/// recording become, to the last bit of the state, those of a run that was not interrupted.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder of the run
+    folder: PathBuf,
+    /// Stop after this many steps, counted from the start of the run
+    #[arg(long, value_name = "N")]
+    pub(super) steps: Option<u64>,
+    /// Serve the viewer from this process on 127.0.0.1, while running and after
+    #[arg(long)]
+    pub(super) serve: bool,
+    /// Port of the served page; 0 takes any free one
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    pub(super) port: u16,
+    #[command(flatten)]
+    pub(super) safety: Safety,
+    /// Print the summary as JSON on stdout
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Print seconds per phase at the end
+    #[arg(long)]
+    pub(super) profile: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let folder = &args.folder;
+    if !folder.is_dir() {
+        let folder = folder.display();
+        return Err(Failure::Environment(format!("{folder}: there is no such folder of a run")));
+    }
+    if is_finished(folder) {
+        let folder = folder.display();
+        return print(&format!("{folder}: the run is finished; there is nothing to go on with"));
+    }
+    let source = scene::load(folder.join("scene.toml"))?;
+    let (scene, plan) = super::resolve(&source)?;
+    super::memory::afford(&plan)?;
+    let (plan, hash) = (Arc::new(plan), scene_hash(&scene));
+    let interrupted = Arc::new(AtomicBool::new(false));
+    run::watch_interrupts(&interrupted);
+    let run_args = run::Args::resumed(args);
+    let mut faults = Vec::new();
+    for (step, path) in checkpoint::list(folder) {
+        let opened = checkpoint::read(&path, &hash)
+            .map_err(|e| Failure::Environment(e.to_string()))
+            .and_then(|state| {
+                let run = sim::start(plan.clone())?;
+                Session::reopen(&run_args, &plan, run, folder.clone(), &state, interrupted.clone())
+            });
+        match opened {
+            Ok(session) => {
+                for fault in &faults {
+                    tell(format_args!("warning: {fault}; going on from the one before"));
+                }
+                tell(format_args!("going on after step {step}"));
+                // It is that of a run which ended earlier.
+                let _ = std::fs::remove_file(folder.join("summary.json"));
+                return session.go();
+            }
+            Err(Failure::Environment(text)) => faults.push(text),
+            Err(other) => return Err(other),
+        }
+    }
+    let reasons: String = faults.iter().map(|f| format!("\n  {f}")).collect();
+    let folder = folder.display();
+    Err(Failure::Environment(format!(
+        "{folder}: holds no checkpoint to go on from{reasons}\n  help: `grainscope run \
+         {folder}/scene.toml --out {folder} --force` starts again; --checkpoint-every keeps \
+         states on the way"
+    )))
+}
+
+fn is_finished(folder: &Path) -> bool {
+    let summary = std::fs::read_to_string(folder.join("summary.json")).ok();
+    let summary = summary.and_then(|t| serde_json::from_str::<serde_json::Value>(&t).ok());
+    summary.is_some_and(|s| s["ending"] == "finished")
+}

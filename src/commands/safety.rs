@@ -1,0 +1,63 @@
+//! Options of runs that keep what was computed, and tell what goes wrong.
+
+use crate::sim::guard::Policy;
+use crate::sim::state::{State, StateError};
+
+#[derive(clap::Args, Clone, Copy, Debug, Default)]
+pub struct Safety {
+    /// Keep the state every so many steps, for `grainscope resume`; the last two stay
+    #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
+    pub checkpoint_every: Option<u64>,
+    /// What to do about a step that fails [default: cut-dt]
+    #[arg(long, value_name = "POLICY", value_enum)]
+    pub on_fault: Option<OnFault>,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OnFault {
+    /// End the run at its last good state
+    Stop,
+    /// Take the step again, shorter, a few times; then end the run
+    CutDt,
+    /// As cut-dt, but go on with a note where a state is inaccurate rather than impossible
+    Continue,
+}
+
+impl Safety {
+    pub fn policy(&self) -> Policy {
+        match self.on_fault {
+            None | Some(OnFault::CutDt) => Policy::CutStep,
+            Some(OnFault::Stop) => Policy::Stop,
+            Some(OnFault::Continue) => Policy::Continue,
+        }
+    }
+
+    /// What is not given is as it was.
+    pub fn or(self, before: Safety) -> Safety {
+        Safety {
+            checkpoint_every: self.checkpoint_every.or(before.checkpoint_every),
+            on_fault: self.on_fault.or(before.on_fault),
+        }
+    }
+
+    pub fn save(&self, state: &mut State) {
+        let policy = match self.on_fault {
+            None => 0,
+            Some(OnFault::Stop) => 1,
+            Some(OnFault::CutDt) => 2,
+            Some(OnFault::Continue) => 3,
+        };
+        state.put_counts("session.safety", [self.checkpoint_every.unwrap_or(0), policy]);
+    }
+
+    pub fn load(state: &State) -> Result<Safety, StateError> {
+        let [every, policy] = state.tally("session.safety")?;
+        let on_fault = match policy {
+            1 => Some(OnFault::Stop),
+            2 => Some(OnFault::CutDt),
+            3 => Some(OnFault::Continue),
+            _ => None,
+        };
+        Ok(Safety { checkpoint_every: (every > 0).then_some(every), on_fault })
+    }
+}

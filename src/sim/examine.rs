@@ -1,0 +1,302 @@
+//! Looking for what cannot be in the state of a run.
+
+use super::Simulation;
+use crate::space::mesh::Mesh;
+
+/// Powers that differ by this share of the larger are no solution: solutions at the usual
+/// tolerance balance to 1e-9.
+const POWER: f64 = 1e-3;
+/// Solutions asked for with a loose tolerance may miss it this many times.
+const POWER_TOLERANCE: f64 = 10.0;
+/// The projected area of a material never strays this far from its volume: coarse meshes come to
+/// 0.05 (`grainscope stress`).
+const DRIFT: f64 = 0.2;
+/// Materials that fill fewer cells have rims instead of an inside, and drift as they like.
+const CELLS_THAT_DRIFT: f64 = 16.0;
+
+/// Where something is wrong; SI coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    Particle {
+        index: usize,
+        cell: usize,
+        x: f64,
+        y: f64,
+    },
+    Node {
+        cell: usize,
+        x: f64,
+        y: f64,
+    },
+    Cell {
+        cell: usize,
+        x: f64,
+        y: f64,
+    },
+    /// A number of the whole scene.
+    Scene,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Place::Particle { index, cell, x, y } => {
+                write!(f, "at particle {index} in cell {cell}, ({x:.4e}, {y:.4e})")
+            }
+            Place::Node { cell, x, y } => {
+                write!(f, "at a node of cell {cell}, ({x:.4e}, {y:.4e})")
+            }
+            Place::Cell { cell, x, y } => write!(f, "in cell {cell}, ({x:.4e}, {y:.4e})"),
+            Place::Scene => write!(f, "in the scene as a whole"),
+        }
+    }
+}
+
+/// Something that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    #[error("{field} is {value:e}, {}, {place}", excess(*.value))]
+    NonFinite { field: &'static str, value: f64, place: Place },
+    #[error("{field} is {value:e}, which must be above zero, {place}")]
+    NotPositive { field: &'static str, value: f64, place: Place },
+    #[error("a particle is outside the domain, {place}")]
+    Outside { place: Place },
+    #[error(
+        "the powers of loads and of dissipation differ by {error:.1e} of the larger, \
+         more than {limit:.1e}"
+    )]
+    Power { error: f64, limit: f64 },
+    #[error(
+        "the area of `{material}` differs from its volume by {drift:.1e} more than at the start, \
+         beyond {limit:.1e}"
+    )]
+    Drift { material: String, drift: f64, limit: f64 },
+    #[error("the volume of all particles changed by {change:.1e} of itself in one step")]
+    Volume { change: f64 },
+}
+
+impl Fault {
+    pub fn is_non_finite(&self) -> bool {
+        matches!(self, Fault::NonFinite { .. })
+    }
+
+    /// The state is inaccurate, but one that steps can go on from.
+    pub fn is_tolerable(&self) -> bool {
+        matches!(self, Fault::Power { .. } | Fault::Drift { .. } | Fault::Volume { .. })
+    }
+
+    /// Likely cause, and what the user can do about it.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Fault::NonFinite { .. } => {
+                "likely cause: an expression or a scheduled change that has no finite value there, \
+                 or a contrast beyond what double precision carries; correct the expression, or \
+                 lower the contrast"
+            }
+            Fault::NotPositive { .. } | Fault::Volume { .. } => {
+                "likely cause: a step too long for a material whose volume or viscosity follows \
+                 the flow; lower time.courant, or raise accuracy.particles_per_cell"
+            }
+            Fault::Outside { .. } => {
+                "likely cause: a step much longer than a cell near a wall; lower time.courant"
+            }
+            Fault::Power { .. } => {
+                "likely cause: a contrast beyond what the solver balances; lower \
+                 accuracy.tolerance, raise accuracy.max_corrections, or lower the contrast"
+            }
+            Fault::Drift { .. } => {
+                "likely cause: too few cells across that material; raise accuracy.cells, or lower \
+                 time.courant"
+            }
+        }
+    }
+}
+
+/// Numbers beyond this have no finite square, and norms are sums of squares.
+const LARGEST: f64 = 1e150;
+
+fn excess(value: f64) -> &'static str {
+    if value.is_finite() { "whose square is not finite" } else { "which is not finite" }
+}
+
+/// The first number that is not finite, or whose square is not, and its index.
+fn first_bad<'a>(values: impl IntoIterator<Item = &'a f64>) -> Option<(usize, f64)> {
+    let good = |v: f64| v.abs() < LARGEST;
+    values.into_iter().copied().enumerate().find(|&(_, v)| !good(v))
+}
+
+fn inside(mesh: &Mesh, p: [f64; 2]) -> bool {
+    let within = |v: f64, axis: &crate::space::mesh::Axis| v >= axis.start() && v <= axis.end();
+    within(p[0], &mesh.x) && within(p[1], &mesh.y)
+}
+
+impl<const D: usize> Simulation<D> {
+    /// The first thing that cannot be: numbers of loads and flow, of particles, of the row.
+    pub(super) fn find_fault(&self) -> Result<(), Fault> {
+        self.faults_of_flow()?;
+        self.faults_of_particles()?;
+        self.faults_of_row()
+    }
+
+    fn faults_of_flow(&self) -> Result<(), Fault> {
+        let mesh = &self.plan.mesh;
+        for (names, nodal) in [
+            (["the load", "the couple of the load"], &self.load),
+            (["the velocity", "the rotation"], &self.flow.velocity),
+        ] {
+            if let Some((k, value)) = first_bad(nodal.as_flattened()) {
+                let at = mesh.node_position(k / D);
+                let [x, y] = self.plan.si(at);
+                let place = Place::Node { cell: mesh.locate(at), x, y };
+                let field = names[usize::from(k % D == 2)];
+                return Err(Fault::NonFinite { field, value, place });
+            }
+        }
+        if let Some((k, value)) = first_bad(self.flow.pressure.as_flattened()) {
+            let cell = k / 3;
+            let [x, y] = self.plan.si(mesh.cell_centre(cell));
+            let place = Place::Cell { cell, x, y };
+            return Err(Fault::NonFinite { field: "the pressure", value, place });
+        }
+        Ok(())
+    }
+
+    fn faults_of_particles(&self) -> Result<(), Fault> {
+        let (mesh, p) = (&self.plan.mesh, &self.particles);
+        let place = |index: usize| {
+            let at = p.position[index];
+            let [x, y] = self.plan.si(at);
+            Place::Particle { index, cell: mesh.locate(at), x, y }
+        };
+        let none: &[f64] = &[];
+        let fields: [(&'static str, usize, &[f64]); 5] = [
+            ("the position", 2, p.position.as_flattened()),
+            ("the volume", 1, &p.volume),
+            ("the director", 2, p.director.as_ref().map_or(none, |d| d.as_flattened())),
+            ("the viscosity", 1, p.viscosity.as_deref().unwrap_or(none)),
+            ("the density", 1, p.density.as_deref().unwrap_or(none)),
+        ];
+        for (field, width, values) in fields {
+            if let Some((k, value)) = first_bad(values) {
+                return Err(Fault::NonFinite { field, value, place: place(k / width) });
+            }
+        }
+        let carries = |k: usize| self.matter.materials[p.material[k] as usize].carries_viscosity;
+        if let Some(k) = p.volume.iter().position(|&v| v <= 0.0) {
+            let (field, value) = ("the volume", p.volume[k]);
+            return Err(Fault::NotPositive { field, value, place: place(k) });
+        }
+        let viscosities = p.viscosity.iter().flatten().enumerate();
+        if let Some((k, &value)) =
+            viscosities.filter(|(k, _)| carries(*k)).find(|(_, v)| **v <= 0.0)
+        {
+            return Err(Fault::NotPositive { field: "the viscosity", value, place: place(k) });
+        }
+        match p.position.iter().position(|&at| !inside(mesh, at)) {
+            Some(k) => Err(Fault::Outside { place: place(k) }),
+            None => Ok(()),
+        }
+    }
+
+    fn faults_of_row(&self) -> Result<(), Fault> {
+        let r = &self.row;
+        let numbers = [
+            ("the time", r.time),
+            ("the power of the loads", r.power_in),
+            ("the dissipation", r.dissipation),
+            ("the power of the stabilisation", r.stabilisation),
+            ("the power error", r.power_error),
+            ("the divergence", r.divergence_error),
+            ("the volume error", r.volume_error),
+            ("the potential energy", r.potential_energy),
+            ("the work", r.work),
+            ("the dissipated energy", r.dissipated),
+        ];
+        let gauges = r.gauges.iter().flat_map(|g| [("a gauge", g.volume), ("a gauge", g.rate)]);
+        for (field, value) in numbers.into_iter().chain(gauges) {
+            if !value.is_finite() {
+                return Err(Fault::NonFinite { field, value, place: Place::Scene });
+            }
+        }
+        let limit = POWER.max(POWER_TOLERANCE * self.plan.method.tolerance);
+        if r.power_error > limit {
+            return Err(Fault::Power { error: r.power_error, limit });
+        }
+        let mesh = &self.plan.mesh;
+        let cell = mesh.x.length() * mesh.y.length() / mesh.cells() as f64;
+        let volumes = self.particles.volumes(self.matter.materials.len());
+        for ((&drift, volume), material) in r.drift.iter().zip(volumes).zip(&self.matter.materials)
+        {
+            let strays = drift.is_nan() || drift.abs() > DRIFT;
+            if volume > CELLS_THAT_DRIFT * cell && strays {
+                let material = material.name.clone();
+                return Err(Fault::Drift { material, drift: drift.abs(), limit: DRIFT });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{plan, scene};
+    use std::sync::Arc;
+
+    fn silo() -> Simulation<3> {
+        let source = scene::presets::find("silo").expect("listed");
+        let source = source.with_sets(&["accuracy.cells=2".into()]).expect("valid");
+        let plan = plan::resolve(&scene::parse(&source).expect("valid")).expect("valid");
+        Simulation::new(Arc::new(plan)).expect("solved")
+    }
+
+    #[test]
+    fn a_good_state_has_no_fault() {
+        assert_eq!(silo().find_fault(), Ok(()));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_named_with_its_place() {
+        let mut sim = silo();
+        sim.particles.volume[7] = f64::NAN;
+        let fault = sim.find_fault().expect_err("a fault");
+        assert!(fault.is_non_finite() && !fault.is_tolerable());
+        let cell = sim.plan.mesh.locate(sim.particles.position[7]);
+        let said = fault.to_string();
+        assert!(said.contains("the volume is NaN"), "{said}");
+        assert!(said.contains(&format!("at particle 7 in cell {cell}, (")), "{said}");
+        assert!(fault.remedy().contains("likely cause"));
+
+        let mut sim = silo();
+        sim.flow.velocity[10][2] = f64::INFINITY;
+        let said = sim.find_fault().expect_err("a fault").to_string();
+        assert!(
+            said.contains("the rotation is inf") && said.contains("at a node of cell"),
+            "{said}"
+        );
+        let mut sim = silo();
+        sim.flow.pressure[3][1] = f64::NAN;
+        let said = sim.find_fault().expect_err("a fault").to_string();
+        assert!(said.contains("the pressure is NaN") && said.contains("in cell 3, ("), "{said}");
+        let mut sim = silo();
+        sim.row.gauges[0].rate = f64::NAN;
+        assert!(sim.find_fault().expect_err("a fault").to_string().contains("a gauge is NaN"));
+    }
+
+    #[test]
+    fn what_cannot_be_is_a_fault_though_it_is_finite() {
+        let mut sim = silo();
+        sim.particles.volume[7] = -1.0;
+        assert!(matches!(sim.find_fault(), Err(Fault::NotPositive { field: "the volume", .. })));
+        let mut sim = silo();
+        sim.particles.position[2] = [1e3, 0.0];
+        assert!(matches!(sim.find_fault(), Err(Fault::Outside { .. })));
+        let mut sim = silo();
+        sim.row.power_error = 0.1;
+        assert!(matches!(sim.find_fault(), Err(f @ Fault::Power { .. }) if f.is_tolerable()));
+        let mut sim = silo();
+        sim.row.drift[0] = -0.5;
+        let fault = sim.find_fault().expect_err("a fault");
+        assert!(fault.is_tolerable() && fault.to_string().contains("`grains`"), "{fault}");
+    }
+}

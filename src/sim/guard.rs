@@ -1,0 +1,310 @@
+//! Every step is examined before anybody sees its result.
+//!
+//! A step that fails, or leads to a state that cannot be, is undone: the run goes back to the last
+//! good state and, by the default policy, tries again with a shorter step. What is given up after
+//! that stands at its last good state, so that it can be looked at, saved and resumed.
+
+use super::state::State;
+use super::{Fault, Run, SimError};
+use crate::solve::stokes::SolveError;
+
+/// What to do about a step that fails.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Policy {
+    /// End the run at its last good state.
+    Stop,
+    /// Take the step again, shorter, a few times; then end the run.
+    #[default]
+    CutStep,
+    /// As `CutStep`, but go on, with a note, where a state is inaccurate rather than impossible.
+    Continue,
+}
+
+/// How often a step is halved: sixteen steps instead of one.
+const MOST_CUTS: u32 = 4;
+
+/// Particles split, merge and move, but their volumes add up to this share.
+const VOLUME: f64 = 1e-9;
+
+/// Takes the steps of a run.
+pub struct Guard {
+    policy: Policy,
+    good: State,
+}
+
+impl Guard {
+    /// Of a run that stands at a good state.
+    pub fn new(policy: Policy, run: &dyn Run) -> Guard {
+        Guard { policy, good: run.state() }
+    }
+
+    /// Examines the first instant.
+    pub fn begin(&self, run: &dyn Run) -> Result<(), SimError> {
+        let (step, time) = (run.row().step, run.row().time);
+        match run.examine() {
+            Err(fault) if !fault.is_tolerable() => Err(SimError::Fault { step, time, fault }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The last state that was found good.
+    pub fn good(&self) -> &State {
+        &self.good
+    }
+
+    /// Takes a step; what there is to be noted about it. After an error the run stands at its last
+    /// good state.
+    pub fn step(&mut self, run: &mut dyn Run) -> Result<Vec<String>, SimError> {
+        let mut notes = Vec::new();
+        let mut cuts = 0;
+        let outcome = loop {
+            let before = Volume::of(run);
+            let error = match attempt(run, before) {
+                Ok(()) => break Ok(()),
+                Err(SimError::Fault { step, fault, .. })
+                    if self.policy == Policy::Continue && fault.is_tolerable() =>
+                {
+                    notes.push(format!("step {step}: {fault}; going on all the same"));
+                    break Ok(());
+                }
+                Err(error) => error,
+            };
+            let shorter = 0.5 * run.attempted_step();
+            if run.restore(&self.good).is_err() || self.policy == Policy::Stop {
+                break Err(error);
+            }
+            if cuts == MOST_CUTS {
+                break Err(SimError::Cut { cuts, source: Box::new(error) });
+            }
+            cuts += 1;
+            notes.push(format!("{error}; taken again with half the step, {shorter:.3e} s"));
+            run.limit_step(Some(shorter));
+        };
+        run.limit_step(None);
+        outcome?;
+        self.good = run.state();
+        Ok(notes)
+    }
+}
+
+/// What is conserved from one step to the next.
+#[derive(Clone, Copy)]
+struct Volume {
+    volume: f64,
+    left: u64,
+}
+
+impl Volume {
+    fn of(run: &dyn Run) -> Volume {
+        Volume { volume: run.particles().volume.iter().sum(), left: run.count().left }
+    }
+
+    /// Volumes follow the flow in compressible scenes, and particles may leave.
+    fn check(self, run: &dyn Run) -> Result<(), Fault> {
+        let now = Volume::of(run);
+        let change = (now.volume / self.volume - 1.0).abs();
+        if now.left == self.left && !run.plan().effects.volume_change && change > VOLUME {
+            return Err(Fault::Volume { change });
+        }
+        Ok(())
+    }
+}
+
+/// Takes a step and examines where it leads.
+fn attempt(run: &mut dyn Run, before: Volume) -> Result<(), SimError> {
+    match run.step() {
+        Ok(()) => {}
+        // Where, if the state tells.
+        Err(SimError::Solve { step, time, source: source @ SolveError::NonFinite { .. } }) => {
+            return Err(match run.examine() {
+                Err(fault) if fault.is_non_finite() => SimError::Fault { step, time, fault },
+                _ => SimError::Solve { step, time, source },
+            });
+        }
+        Err(error) => return Err(error),
+    }
+    let (step, time) = (run.row().step, run.row().time);
+    let examined = run.examine().and_then(|()| before.check(run));
+    examined.map_err(|fault| SimError::Fault { step, time, fault })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame;
+    use crate::plan::{Plan, Warning};
+    use crate::sim::row::Row;
+    use crate::sim::state::StateError;
+    use crate::solve::multifrontal::Effort;
+    use crate::space::particles::Particles;
+    use crate::space::population::Count;
+    use crate::{plan, scene, sim};
+    use std::sync::Arc;
+
+    /// What goes wrong in steps that are longer than they may be.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Wrong {
+        Failing,
+        NonFinite,
+        Inaccurate,
+    }
+
+    /// A run whose third step goes wrong if it is long.
+    struct Fragile {
+        run: Box<dyn Run>,
+        wrong: Wrong,
+        /// As a share of the step that would be taken, which is learnt from the first try.
+        share: f64,
+        usual: f64,
+    }
+
+    impl Fragile {
+        fn new(wrong: Wrong, share: f64) -> Fragile {
+            let source = scene::presets::find("silo").expect("listed");
+            let source = source.with_sets(&["accuracy.cells=2".into()]).expect("valid");
+            let plan = plan::resolve(&scene::parse(&source).expect("valid")).expect("valid");
+            let run = sim::start(Arc::new(plan)).expect("solved");
+            Fragile { run, wrong, share, usual: 0.0 }
+        }
+
+        fn goes_wrong(&self) -> bool {
+            self.run.row().step == 3 && self.run.attempted_step() > self.share * self.usual
+        }
+    }
+
+    impl Run for Fragile {
+        fn step(&mut self) -> Result<(), SimError> {
+            self.run.step()?;
+            if self.run.row().step == 3 && self.usual == 0.0 {
+                self.usual = self.run.attempted_step();
+            }
+            if self.wrong == Wrong::Failing && self.goes_wrong() {
+                return Err(SimError::Step { step: 3, time: 0.0, dt: 0.0 });
+            }
+            Ok(())
+        }
+        fn examine(&self) -> Result<(), Fault> {
+            let place = crate::sim::Place::Scene;
+            match self.wrong {
+                Wrong::NonFinite if self.goes_wrong() => {
+                    Err(Fault::NonFinite { field: "the speed", value: f64::NAN, place })
+                }
+                Wrong::Inaccurate if self.goes_wrong() => {
+                    Err(Fault::Power { error: 0.5, limit: 0.1 })
+                }
+                _ => self.run.examine(),
+            }
+        }
+        fn is_finished(&self) -> bool {
+            self.run.is_finished()
+        }
+        fn row(&self) -> &Row {
+            self.run.row()
+        }
+        fn plan(&self) -> &Plan {
+            self.run.plan()
+        }
+        fn particles(&self) -> &Particles {
+            self.run.particles()
+        }
+        fn velocity_at(&self, p: [f64; 2]) -> [f64; 3] {
+            self.run.velocity_at(p)
+        }
+        fn pressure_at(&self, p: [f64; 2]) -> f64 {
+            self.run.pressure_at(p)
+        }
+        fn picture(&self) -> frame::Picture {
+            self.run.picture()
+        }
+        fn state_hash(&self) -> String {
+            self.run.state_hash()
+        }
+        fn unknowns(&self) -> [usize; 2] {
+            self.run.unknowns()
+        }
+        fn count(&self) -> Count {
+            self.run.count()
+        }
+        fn factor_effort(&self) -> Effort {
+            self.run.factor_effort()
+        }
+        fn forget_factor(&mut self) {
+            self.run.forget_factor();
+        }
+        fn warnings(&self) -> Vec<Warning> {
+            self.run.warnings()
+        }
+        fn events(&self) -> &[String] {
+            self.run.events()
+        }
+        fn changes_applied(&self) -> usize {
+            self.run.changes_applied()
+        }
+        fn replan(&mut self, plan: Arc<Plan>) {
+            self.run.replan(plan);
+        }
+        fn state(&self) -> State {
+            self.run.state()
+        }
+        fn restore(&mut self, state: &State) -> Result<(), StateError> {
+            self.run.restore(state)
+        }
+        fn limit_step(&mut self, longest: Option<f64>) {
+            self.run.limit_step(longest);
+        }
+        fn attempted_step(&self) -> f64 {
+            self.run.attempted_step()
+        }
+    }
+
+    /// The third step of a run that goes wrong there.
+    fn third(policy: Policy, run: &mut Fragile) -> Result<Vec<String>, SimError> {
+        let mut guard = Guard::new(policy, run);
+        for _ in 0..2 {
+            assert!(guard.step(run).expect("a good step").is_empty());
+        }
+        guard.step(run)
+    }
+
+    #[test]
+    fn a_step_that_fails_is_taken_again_shorter() {
+        for wrong in [Wrong::Failing, Wrong::NonFinite, Wrong::Inaccurate] {
+            let mut run = Fragile::new(wrong, 0.3);
+            let notes = third(Policy::CutStep, &mut run).expect("saved");
+            assert_eq!(notes.len(), 2, "{notes:?}");
+            assert_eq!(run.row().step, 3);
+            assert_eq!(run.row().dt_limiter, sim::clock::Limiter::Guard);
+            assert!((run.attempted_step() / run.usual - 0.25).abs() < 1e-12);
+            // It is the step that this run would have taken had it known.
+            let mut other = Fragile::new(wrong, 2.0);
+            for _ in 0..2 {
+                other.step().expect("a good step");
+            }
+            other.limit_step(Some(0.25 * run.usual));
+            other.step().expect("a good step");
+            assert_eq!(other.state_hash(), run.state_hash());
+        }
+    }
+
+    #[test]
+    fn what_never_works_ends_at_the_last_good_state() {
+        for (policy, told) in [(Policy::Stop, 0), (Policy::CutStep, 4), (Policy::Continue, 4)] {
+            let mut run = Fragile::new(Wrong::NonFinite, 0.0);
+            let mut before = Fragile::new(Wrong::NonFinite, 2.0);
+            before.step().and_then(|()| before.step()).expect("two good steps");
+            let error = third(policy, &mut run).expect_err("no way on");
+            assert!(error.is_non_finite(), "{error}");
+            assert_eq!(error.to_string().contains("taken again"), told > 0, "{error}");
+            assert_eq!((run.row().step, run.state_hash()), (2, before.state_hash()));
+        }
+    }
+
+    #[test]
+    fn what_is_tolerable_is_noted_and_gone_on_from_if_that_is_wished() {
+        let mut run = Fragile::new(Wrong::Inaccurate, 0.0);
+        let notes = third(Policy::Continue, &mut run).expect("tolerated");
+        assert_eq!(run.row().step, 3);
+        assert!(notes.len() == 1 && notes[0].contains("going on all the same"), "{notes:?}");
+        assert!(third(Policy::Stop, &mut Fragile::new(Wrong::Inaccurate, 0.0)).is_err());
+    }
+}

@@ -1,0 +1,402 @@
+//! The state of a run as plain columns of numbers: everything that the next step depends on.
+//!
+//! A run that takes back its state goes on to the last bit as if it had never stopped. So whatever
+//! a simulation carries from one step to the next belongs here; what it can work out from that
+//! (integration points, matrices, loads) does not. A new field is a new column: readers ask for
+//! columns by name.
+
+use super::clock::Limiter;
+use super::row::{GaugeRow, Phases, Row};
+use super::{Before, Simulation};
+use crate::space::flow::Flow;
+use crate::space::particles::Particles;
+use crate::space::population::Count;
+use std::collections::BTreeMap;
+
+/// Values of one kind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    Floats(Vec<f64>),
+    Counts(Vec<u64>),
+    Bytes(Vec<u8>),
+}
+
+/// Named columns.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    columns: BTreeMap<String, Column>,
+}
+
+/// Why a run cannot go on from a state.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StateError {
+    #[error("the state has no `{0}`")]
+    Missing(String),
+    #[error("`{name}` of the state has {found} values, where {expected} belong")]
+    Length { name: String, found: usize, expected: usize },
+    #[error("`{name}` of the state is out of range: {value}")]
+    Range { name: &'static str, value: String },
+}
+
+impl State {
+    pub fn columns(&self) -> impl Iterator<Item = (&str, &Column)> {
+        self.columns.iter().map(|(name, column)| (name.as_str(), column))
+    }
+
+    pub fn insert(&mut self, name: impl Into<String>, column: Column) {
+        self.columns.insert(name.into(), column);
+    }
+
+    pub fn put_floats(&mut self, name: &str, values: impl Into<Vec<f64>>) {
+        self.insert(name, Column::Floats(values.into()));
+    }
+
+    pub fn put_counts(&mut self, name: &str, values: impl Into<Vec<u64>>) {
+        self.insert(name, Column::Counts(values.into()));
+    }
+
+    pub fn put_bytes(&mut self, name: &str, values: impl Into<Vec<u8>>) {
+        self.insert(name, Column::Bytes(values.into()));
+    }
+
+    /// A column that only some runs have.
+    pub fn try_floats(&self, name: &str) -> Option<&[f64]> {
+        match self.columns.get(name) {
+            Some(Column::Floats(values)) => Some(values),
+            _ => None,
+        }
+    }
+
+    pub fn floats(&self, name: &str) -> Result<&[f64], StateError> {
+        self.try_floats(name).ok_or_else(|| StateError::Missing(name.into()))
+    }
+
+    pub fn counts(&self, name: &str) -> Result<&[u64], StateError> {
+        match self.columns.get(name) {
+            Some(Column::Counts(values)) => Ok(values),
+            _ => Err(StateError::Missing(name.into())),
+        }
+    }
+
+    pub fn try_bytes(&self, name: &str) -> Option<&[u8]> {
+        match self.columns.get(name) {
+            Some(Column::Bytes(values)) => Some(values),
+            _ => None,
+        }
+    }
+
+    pub fn bytes(&self, name: &str) -> Result<&[u8], StateError> {
+        self.try_bytes(name).ok_or_else(|| StateError::Missing(name.into()))
+    }
+
+    /// A text column.
+    pub fn text(&self, name: &str) -> Result<&str, StateError> {
+        std::str::from_utf8(self.bytes(name)?).map_err(|_| StateError::Missing(name.into()))
+    }
+
+    /// Exactly `N` numbers.
+    pub fn numbers<const N: usize>(&self, name: &str) -> Result<[f64; N], StateError> {
+        let values = self.floats(name)?;
+        values.try_into().map_err(|_| wrong_length(name, values.len(), N))
+    }
+
+    /// Exactly `N` counts.
+    pub fn tally<const N: usize>(&self, name: &str) -> Result<[u64; N], StateError> {
+        let values = self.counts(name)?;
+        values.try_into().map_err(|_| wrong_length(name, values.len(), N))
+    }
+
+    /// `count` numbers.
+    fn exactly(&self, name: &str, count: usize) -> Result<&[f64], StateError> {
+        let values = self.floats(name)?;
+        if values.len() == count {
+            Ok(values)
+        } else {
+            Err(wrong_length(name, values.len(), count))
+        }
+    }
+
+    /// `count` tuples of numbers.
+    fn tuples<const N: usize>(
+        &self,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<[f64; N]>, StateError> {
+        Ok(self.exactly(name, N * count)?.as_chunks().0.to_vec())
+    }
+}
+
+fn wrong_length(name: &str, found: usize, expected: usize) -> StateError {
+    StateError::Length { name: name.into(), found, expected }
+}
+
+fn save_particles(p: &Particles, s: &mut State) {
+    s.put_floats("particles.position", p.position.as_flattened());
+    s.put_floats("particles.volume", p.volume.as_slice());
+    s.put_bytes("particles.material", p.material.as_slice());
+    if let Some(d) = &p.director {
+        s.put_floats("particles.director", d.as_flattened());
+    }
+    if let Some(v) = &p.viscosity {
+        s.put_floats("particles.viscosity", v.as_slice());
+    }
+    if let Some(d) = &p.density {
+        s.put_floats("particles.density", d.as_slice());
+    }
+    if let Some(m) = &p.mark {
+        s.put_bytes("particles.mark", m.iter().map(|&m| u8::from(m)).collect::<Vec<_>>());
+    }
+}
+
+/// Particles with the columns that `like` has; not sorted yet.
+fn load_particles(s: &State, like: &Particles, materials: usize) -> Result<Particles, StateError> {
+    let material = s.bytes("particles.material")?.to_vec();
+    let n = material.len();
+    if let Some(m) = material.iter().find(|&&m| usize::from(m) >= materials) {
+        return Err(StateError::Range { name: "particles.material", value: m.to_string() });
+    }
+    let position = s.tuples("particles.position", n)?;
+    if let Some(p) = position.iter().flatten().find(|v: &&f64| !v.is_finite()) {
+        return Err(StateError::Range { name: "particles.position", value: p.to_string() });
+    }
+    let column = |exists: bool, name: &str| -> Result<Option<Vec<f64>>, StateError> {
+        exists.then(|| Ok(s.exactly(name, n)?.to_vec())).transpose()
+    };
+    let mark = match &like.mark {
+        None => None,
+        Some(_) => {
+            let mark = s.bytes("particles.mark")?;
+            if mark.len() != n {
+                return Err(wrong_length("particles.mark", mark.len(), n));
+            }
+            Some(mark.iter().map(|&m| m != 0).collect())
+        }
+    };
+    Ok(Particles {
+        position,
+        volume: s.exactly("particles.volume", n)?.to_vec(),
+        material,
+        director: like.director.as_ref().map(|_| s.tuples("particles.director", n)).transpose()?,
+        viscosity: column(like.viscosity.is_some(), "particles.viscosity")?,
+        density: column(like.density.is_some(), "particles.density")?,
+        mark,
+        ..Particles::default()
+    })
+}
+
+fn save_row(row: &Row, s: &mut State) {
+    let limiter = Limiter::ALL.iter().position(|&l| l == row.dt_limiter).unwrap_or(0);
+    s.put_counts(
+        "row.counts",
+        [
+            row.step,
+            limiter as u64,
+            u64::from(row.iterations),
+            row.particles as u64,
+            row.active_rotation as u64,
+            row.splits,
+            row.merges,
+            row.held,
+        ],
+    );
+    s.put_floats(
+        "row.numbers",
+        [
+            row.time,
+            row.dt,
+            row.wall,
+            row.power_in,
+            row.dissipation,
+            row.stabilisation,
+            row.power_error,
+            row.divergence_error,
+            row.volume_error,
+            row.max_speed,
+            row.rms_speed,
+            row.potential_energy,
+            row.work,
+            row.dissipated,
+            row.director_error,
+        ],
+    );
+    s.put_floats("row.alignment", row.alignment.as_slice());
+    let gauges = row.gauges.iter().flat_map(|g| [g.volume, g.rate]);
+    s.put_floats("row.gauges", gauges.collect::<Vec<_>>());
+    s.put_floats("row.drift", row.drift.as_slice());
+    save_phases("row.seconds", &row.seconds, s);
+}
+
+fn load_row(s: &State, gauges: usize, materials: usize) -> Result<Row, StateError> {
+    let [step, limiter, iterations, particles, active_rotation, splits, merges, held] =
+        s.tally("row.counts")?;
+    let [
+        time,
+        dt,
+        wall,
+        power_in,
+        dissipation,
+        stabilisation,
+        power_error,
+        divergence_error,
+        volume_error,
+        max_speed,
+        rms_speed,
+        potential_energy,
+        work,
+        dissipated,
+        director_error,
+    ] = s.numbers("row.numbers")?;
+    let out_of_range =
+        |name: &'static str, value: u64| StateError::Range { name, value: value.to_string() };
+    Ok(Row {
+        step,
+        time,
+        dt,
+        dt_limiter: *usize::try_from(limiter)
+            .ok()
+            .and_then(|k| Limiter::ALL.get(k))
+            .ok_or_else(|| out_of_range("row.counts (limiter)", limiter))?,
+        wall,
+        power_in,
+        dissipation,
+        stabilisation,
+        power_error,
+        divergence_error,
+        volume_error,
+        iterations: u32::try_from(iterations)
+            .map_err(|_| out_of_range("row.counts (iterations)", iterations))?,
+        particles: particles as usize,
+        max_speed,
+        rms_speed,
+        potential_energy,
+        work,
+        dissipated,
+        director_error,
+        alignment: s.floats("row.alignment")?.first().copied(),
+        active_rotation: active_rotation as usize,
+        splits,
+        merges,
+        held,
+        gauges: s
+            .tuples("row.gauges", gauges)?
+            .into_iter()
+            .map(|[volume, rate]| GaugeRow { volume, rate })
+            .collect(),
+        drift: s.exactly("row.drift", materials)?.to_vec(),
+        seconds: load_phases("row.seconds", s)?,
+    })
+}
+
+/// Writes seconds by phase.
+pub fn save_phases(name: &str, phases: &Phases, s: &mut State) {
+    s.put_floats(name, phases.list().map(|(_, seconds)| seconds));
+}
+
+/// Reads what [`save_phases`] wrote.
+pub fn load_phases(name: &str, s: &State) -> Result<Phases, StateError> {
+    let [quadrature, weight, assemble, factor, solve, motion, dye, population, diagnostics] =
+        s.numbers(name)?;
+    Ok(Phases { quadrature, weight, assemble, factor, solve, motion, dye, population, diagnostics })
+}
+
+impl<const D: usize> Simulation<D> {
+    /// Everything that the next step depends on.
+    pub(super) fn save(&self) -> State {
+        let mut s = State::default();
+        save_particles(&self.particles, &mut s);
+        s.put_floats("flow.velocity", self.flow.velocity.as_flattened());
+        s.put_floats("flow.pressure", self.flow.pressure.as_flattened());
+        if let Some(Before { flow, dt }) = &self.previous {
+            s.put_floats("previous.velocity", flow.velocity.as_flattened());
+            s.put_floats("previous.pressure", flow.pressure.as_flattened());
+            s.put_floats("previous.step", [*dt]);
+        }
+        // The points follow from the factors that they were made with; the new factors from both.
+        s.put_floats("quadrature.factors", self.factors_of_points.as_slice());
+        s.put_floats("gauges", self.gauges.iter().map(|g| g.volume).collect::<Vec<_>>());
+        if let Some(dye) = &self.dye {
+            let points: Vec<f64> = dye.lines.iter().flatten().flatten().copied().collect();
+            s.put_floats("dye.points", points);
+            s.put_counts("dye.lines", dye.lines.iter().map(|l| l.len() as u64).collect::<Vec<_>>());
+        }
+        let c = self.count;
+        s.put_counts("count", [c.splits, c.merges, c.held, c.left, c.healed]);
+        s.put_counts("progress", [self.step, u64::from(self.version), self.next_change as u64]);
+        s.put_floats("time", [self.time]);
+        s.put_floats("baseline", self.baseline.as_slice());
+        s.put_floats("other_power", [self.last_other_power]);
+        save_row(&self.row, &mut s);
+        s
+    }
+
+    /// Goes back, or ahead, to a state of a run of the same plan. After an error the run is what it
+    /// was before.
+    pub(super) fn load(&mut self, s: &State) -> Result<(), StateError> {
+        let plan = self.plan.clone();
+        let (mesh, materials) = (&plan.mesh, self.matter.materials.len());
+        let mut particles = load_particles(s, &self.particles, materials)?;
+        let flow = Flow {
+            velocity: s.tuples("flow.velocity", mesh.nodes())?,
+            pressure: s.tuples("flow.pressure", mesh.cells())?,
+        };
+        let previous = match s.try_floats("previous.velocity") {
+            None => None,
+            Some(_) => {
+                let [dt] = s.numbers("previous.step")?;
+                let velocity = s.tuples("previous.velocity", mesh.nodes())?;
+                let pressure = s.tuples("previous.pressure", mesh.cells())?;
+                Some(Before { flow: Flow { velocity, pressure }, dt })
+            }
+        };
+        let factors = s.exactly("quadrature.factors", materials)?;
+        let gauges = s.exactly("gauges", self.gauges.len())?;
+        let dye = self.dye.as_ref().map(|_| dye_lines(s)).transpose()?;
+        let [splits, merges, held, left, healed] = s.tally("count")?;
+        let [step, version, next_change] = s.tally("progress")?;
+        let changes = plan.changes.get(..next_change as usize).ok_or(StateError::Range {
+            name: "progress (changes)",
+            value: next_change.to_string(),
+        })?;
+        let version = u32::try_from(version).map_err(|_| StateError::Range {
+            name: "progress (version)",
+            value: version.to_string(),
+        })?;
+        let [time] = s.numbers("time")?;
+        let baseline = s.exactly("baseline", materials)?;
+        let [last_other_power] = s.numbers("other_power")?;
+        let row = load_row(s, self.gauges.len(), materials)?;
+
+        particles.sort(mesh);
+        self.matter = changes.last().map_or(&plan.state, |c| &c.state).clone();
+        self.quadrature.set_factors(factors);
+        self.factors_of_points = factors.to_vec();
+        self.quadrature
+            .update(mesh, &particles, &self.matter.materials, version)
+            .map_err(|e| StateError::Range { name: "particles.position", value: e.to_string() })?;
+        self.particles = particles;
+        self.flow = flow;
+        self.previous = previous;
+        for (gauge, &volume) in self.gauges.iter_mut().zip(gauges) {
+            gauge.volume = volume;
+        }
+        if let (Some(dye), Some(lines)) = (&mut self.dye, dye) {
+            dye.lines = lines;
+        }
+        self.count = Count { splits, merges, held, left, healed };
+        (self.step, self.version, self.next_change) = (step, version, next_change as usize);
+        self.time = time;
+        self.baseline = baseline.to_vec();
+        self.last_other_power = last_other_power;
+        self.row = row;
+        self.events.clear();
+        Ok(())
+    }
+}
+
+fn dye_lines(s: &State) -> Result<Vec<Vec<[f64; 2]>>, StateError> {
+    let lengths = s.counts("dye.lines")?;
+    let total = lengths.iter().fold(0u64, |a, &b| a.saturating_add(b));
+    let count = usize::try_from(total).unwrap_or(usize::MAX / 2);
+    let mut points = s.tuples::<2>("dye.points", count.min(usize::MAX / 2))?.into_iter();
+    Ok(lengths.iter().map(|&n| points.by_ref().take(n as usize).collect()).collect())
+}

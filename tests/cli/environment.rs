@@ -1,0 +1,281 @@
+//! Disks, folders, rights, pipes, viewers and ports that fail, each tried for real.
+
+use super::*;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A silo of some seconds.
+const RUN: [&str; 9] = [
+    "run",
+    "silo",
+    "--set",
+    "accuracy.cells=3",
+    "--set",
+    "recording.frames=400",
+    "--until",
+    "2e-4",
+    "--out",
+];
+
+fn arguments<'a>(out: &'a str, rest: &[&'a str]) -> Vec<&'a str> {
+    [&RUN[..], &[out], rest].concat()
+}
+
+fn is_root() -> bool {
+    let said = Command::new("id").arg("-u").output();
+    said.is_ok_and(|o| o.stdout.starts_with(b"0"))
+}
+
+fn works(program: &str, arguments: &[&str]) -> bool {
+    Command::new(program).args(arguments).stderr(Stdio::null()).status().is_ok_and(|s| s.success())
+}
+
+/// Waits until a run has written some rows.
+fn wait_for_rows(here: &TempFolder, out: &str, rows: usize) {
+    let clock = Instant::now();
+    let count = || {
+        std::fs::read_to_string(here.path(out).join("series.csv"))
+            .map_or(0, |t| t.lines().count().saturating_sub(1))
+    };
+    while count() < rows {
+        assert!(clock.elapsed() < PATIENCE, "no steps are taken");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// A small disk, unmounted when this is dropped.
+struct Disk(PathBuf);
+
+impl Disk {
+    /// Needs rights that not everybody has.
+    fn mount(path: PathBuf, size: &str) -> Option<Disk> {
+        std::fs::create_dir(&path).expect("a folder");
+        let target = path.to_string_lossy().into_owned();
+        let options = format!("size={size}");
+        let mounted =
+            is_root() && works("mount", &["-t", "tmpfs", "-o", &options, "tmpfs", &target]);
+        mounted.then_some(Disk(path))
+    }
+
+    fn resize(&self, size: &str) {
+        let options = format!("remount,size={size}");
+        assert!(works("mount", &["-o", &options, &self.0.to_string_lossy()]));
+    }
+}
+
+impl Drop for Disk {
+    fn drop(&mut self) {
+        let _ = works("umount", &["-l", &self.0.to_string_lossy()]);
+    }
+}
+
+#[test]
+fn a_full_disk_is_named_and_the_run_goes_on_when_there_is_room() {
+    let here = TempFolder::new();
+    let Some(disk) = Disk::mount(here.path("disk"), "4m") else {
+        eprintln!("skipped: no disk can be mounted here (needs root)");
+        return;
+    };
+    here.grainscope(&arguments("whole", &[])).exits(0);
+    let run = arguments("disk/run", &["--checkpoint-every", "2"]);
+    let said = here.grainscope(&run).exits(1);
+    said.complains(&["No space left on device", "disk/run"]);
+    // What is there is whole.
+    let rows = Table::read(&here.read("disk/run/series.csv")).rows.len();
+    assert!(rows > 2, "{rows}");
+    disk.resize("100m");
+    let said = here.grainscope(&["resume", "disk/run"]).exits(0);
+    said.complains(&["going on after step"]);
+    let hash = |run: &str| here.json(&format!("{run}/summary.json"))["state_hash"].clone();
+    assert_eq!(hash("disk/run"), hash("whole"));
+    let table = |run: &str| Table::read(&here.read(&format!("{run}/series.csv")));
+    let (whole, run) = (table("whole"), table("disk/run"));
+    assert_eq!(whole.without("wall"), run.without("wall"));
+    let store = recording::recording(&here.path("disk/run/recording.rrd"));
+    assert_eq!(recording::steps(&store).len(), run.rows.len());
+}
+
+#[test]
+fn a_folder_that_is_gone_is_named() {
+    let here = TempFolder::new();
+    let run = arguments("gone", &["--checkpoint-every", "2"]);
+    let child = here
+        .command(&run)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    wait_for_rows(&here, "gone", 2);
+    // Files may be made in it meanwhile.
+    let clock = Instant::now();
+    while std::fs::remove_dir_all(here.path("gone")).is_err() && here.has("gone") {
+        assert!(clock.elapsed() < PATIENCE);
+    }
+    let said = Said::new(&run, child.wait_with_output().expect("an end")).exits(1);
+    said.complains(&["gone/", "No such file or directory"]);
+    assert!(!here.has("gone"), "it is not made again");
+}
+
+#[test]
+fn rights_that_lack_are_named() {
+    let user = ["--reuid=65534", "--regid=65534", "--clear-groups"];
+    let program = env!("CARGO_BIN_EXE_grainscope");
+    if !is_root() || !works("setpriv", &[&user[..], &[program, "--version"]].concat()) {
+        eprintln!("skipped: no other user can be (needs root and setpriv)");
+        return;
+    }
+    let here = TempFolder::new();
+    std::fs::create_dir(here.path("mine")).expect("a folder");
+    let run = arguments("mine/run", &[]);
+    let said = Command::new("setpriv")
+        .args(user)
+        .arg(program)
+        .args(&run)
+        .current_dir(here.path("."))
+        .env("NO_COLOR", "1")
+        .output()
+        .expect("starts");
+    let said = Said::new(&run, said).exits(1);
+    said.complains(&["mine/run", "cannot be written", "Permission denied"]);
+}
+
+#[test]
+fn nobody_who_listens_is_no_fault() {
+    let here = TempFolder::new();
+    // Both ends of both pipes are closed before anything is said.
+    let mut child = here
+        .command(&arguments("run", &["--steps", "2"]))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop((child.stdout.take(), child.stderr.take()));
+    assert_eq!(child.wait().expect("an end").code(), Some(0));
+    assert_eq!(here.json("run/summary.json")["steps"], 2);
+    // Nor does a fault become another one.
+    let mut child = here
+        .command(&["run", "nonsense"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stderr.take());
+    assert_eq!(child.wait().expect("an end").code(), Some(3));
+}
+
+#[test]
+fn a_viewer_that_dies_does_not_take_the_run_with_it() {
+    let here = TempFolder::new();
+    // A viewer's server: the page of a run that is over.
+    let mut viewer = here
+        .command(&["run", "couette_cosserat", "--steps", "0", "--no-recording", "--serve"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut said = String::new();
+    let mut out = std::io::BufReader::new(viewer.stderr.take().expect("piped"));
+    while !said.contains("proxy") {
+        let read = std::io::BufRead::read_line(&mut out, &mut said).expect("a line");
+        assert!(read > 0, "{said}");
+    }
+    let port = said.split("%3A").last().and_then(|s| s.split("%2F").next()).expect("a port");
+    let url = format!("rerun+http://127.0.0.1:{port}/proxy");
+    here.grainscope(&arguments("whole", &["--no-recording"])).exits(0);
+    let run = arguments("run", &["--connect", &url]);
+    let child = here
+        .command(&run)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    wait_for_rows(&here, "run", 2);
+    viewer.kill().expect("killed");
+    viewer.wait().expect("an end");
+    let said = Said::new(&run, child.wait_with_output().expect("an end")).exits(0);
+    said.complains(&["warning: the viewer at rerun+http://127.0.0.1"]);
+    let summary = here.json("run/summary.json");
+    assert_eq!(summary["state_hash"], here.json("whole/summary.json")["state_hash"]);
+    let rows = Table::read(&here.read("run/series.csv")).rows.len();
+    let store = recording::recording(&here.path("run/recording.rrd"));
+    assert_eq!(recording::steps(&store).len(), rows);
+}
+
+#[test]
+fn a_port_that_is_taken_is_named() {
+    let here = TempFolder::new();
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = taken.local_addr().expect("an address").port().to_string();
+    let run = arguments("run", &["--serve", "--port", &port]);
+    let said = here.grainscope(&run).exits(1);
+    said.complains(&[&format!("port {port} of this machine cannot be used"), "any free port"]);
+    assert!(!here.has("run"));
+}
+
+#[test]
+fn a_run_is_the_same_however_it_is_watched() {
+    let here = TempFolder::new();
+    let steps = ["--steps", "6"];
+    // Whatever must not change a result belongs here.
+    let ways: [&[&str]; 6] = [
+        &[],
+        &[],
+        &["--no-recording"],
+        &["--checkpoint-every", "1"],
+        &["--on-fault", "stop", "--profile"],
+        &["--save", "elsewhere.rrd", "--json"],
+    ];
+    let mut states = Vec::new();
+    for (k, way) in ways.iter().enumerate() {
+        let out = format!("run{k}");
+        here.grainscope(&arguments(&out, &[&steps[..], way].concat())).exits(0);
+        states.push(here.json(&format!("{out}/summary.json"))["state_hash"].clone());
+    }
+    states.dedup();
+    assert_eq!(states.len(), 1, "{states:?}");
+}
+
+#[test]
+fn a_scene_that_the_machine_has_no_memory_for_is_refused() {
+    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let total = text.lines().find(|l| l.starts_with("MemTotal")).map_or("", |l| &l[9..]);
+    let kib: f64 = total.trim().trim_end_matches(" kB").parse().unwrap_or(f64::INFINITY);
+    if kib > 64e6 {
+        eprintln!("skipped: this machine has memory enough, or does not say");
+        return;
+    }
+    let here = TempFolder::new();
+    let huge = ["couette_cosserat", "--set", "accuracy.cells=990"];
+    for command in ["plan", "run"] {
+        let said = here.grainscope(&[&[command], &huge[..]].concat()).exits(1);
+        said.complains(&["cells need about", "GB of memory", "this machine has", "lower accuracy"]);
+    }
+    assert!(!here.has("runs"));
+    here.grainscope(&["plan", "silo", "--no-measure"]).exits(0).complains(&["a run takes about"]);
+}
+
+#[test]
+fn the_doctor_knows_what_a_bug_report_needs() {
+    let here = TempFolder::new();
+    let facts = here.grainscope(&["doctor", "--json"]).exits(0).json();
+    let keys = [
+        "grainscope",
+        "recordings",
+        "checkpoints",
+        "system",
+        "processor",
+        "features",
+        "threads",
+        "memory",
+        "disk",
+        "folder",
+        "viewer",
+        "ports",
+    ];
+    for key in keys {
+        assert!(facts[key].as_str().is_some_and(|v| !v.is_empty()), "{key}: {facts}");
+    }
+    assert_eq!(facts["grainscope"], env!("CARGO_PKG_VERSION"));
+    here.grainscope(&["doctor"]).exits(0).prints(&["threads", "can be written"]);
+}

@@ -1,0 +1,160 @@
+//! Runs that are killed at any moment, or told to end.
+
+use super::*;
+use rand::{Rng, SeedableRng};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+/// How much is tried: a few in CI, many in the long tier (`.ci/run --long`).
+pub fn effort(name: &str, usual: u64) -> u64 {
+    std::env::var(name).map_or(usual, |text| text.parse().expect("a number"))
+}
+
+pub fn random() -> rand_pcg::Pcg64Mcg {
+    rand_pcg::Pcg64Mcg::seed_from_u64(effort("GRAINSCOPE_SEED", 1))
+}
+
+/// A silo of some steps, with pictures and checkpoints on the way.
+const RUN: [&str; 11] = [
+    "run",
+    "silo",
+    "--set",
+    "accuracy.cells=2",
+    "--set",
+    "recording.frames=400",
+    "--until",
+    "1e-4",
+    "--checkpoint-every",
+    "2",
+    "--out",
+];
+
+fn arguments(out: &str) -> Vec<&str> {
+    [&RUN[..], &[out]].concat()
+}
+
+/// Starts, and kills after a while unless it has ended; whether it was killed.
+fn killed(here: &TempFolder, arguments: &[&str], after: Duration) -> bool {
+    let mut child = here
+        .command(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    std::thread::sleep(after);
+    let running = child.try_wait().expect("known").is_none();
+    // SIGKILL
+    let _ = child.kill();
+    child.wait().expect("an end");
+    running
+}
+
+/// Every row that is there is whole.
+fn whole_rows(here: &TempFolder, out: &str) -> usize {
+    let path = format!("{out}/series.csv");
+    if !here.has(&path) || here.read(&path).is_empty() {
+        return 0;
+    }
+    let table = Table::read(&here.read(&path));
+    let steps: Vec<String> = (0..table.rows.len()).map(|k| k.to_string()).collect();
+    assert_eq!(table.text("step"), steps);
+    steps.len()
+}
+
+/// The recording opens, and has no gap; its number of steps.
+fn opens(here: &TempFolder, out: &str) -> usize {
+    let file = format!("{out}/recording.rrd");
+    if !here.has(&file) || std::fs::metadata(here.path(&file)).expect("a file").len() < 100 {
+        // Killed while it was made: nothing had been recorded.
+        assert!(whole_rows(here, out) < 2);
+        return 0;
+    }
+    // The viewer and its SDKs read what is cut; repaired it is whole for all its tools.
+    let copy = format!("{out}.rrd");
+    std::fs::copy(here.path(&file), here.path(&copy)).expect("a copy");
+    here.grainscope(&["repair", &copy]).exits(0);
+    here.grainscope(&["repair", &copy]).exits(0).prints(&["is whole"]);
+    let steps = recording::steps(&recording::recording(&here.path(&copy)));
+    assert_eq!(steps, (0..steps.len() as i64).collect::<Vec<_>>());
+    steps.len()
+}
+
+#[test]
+fn killed_at_any_moment_nothing_is_lost() {
+    let here = TempFolder::new();
+    let clock = Instant::now();
+    here.grainscope(&arguments("whole")).exits(0);
+    let usual = clock.elapsed();
+    let whole = Table::read(&here.read("whole/series.csv"));
+    let hash = here.json("whole/summary.json")["state_hash"].clone();
+    let (mut random, wanted) = (random(), effort("GRAINSCOPE_KILLS", 10));
+    let moment = |random: &mut rand_pcg::Pcg64Mcg| usual.mul_f64(random.random_range(0.0..1.0));
+    let (mut kills, mut resumed, mut restarted) = (0, 0, 0);
+    for k in 0.. {
+        if kills >= wanted {
+            break;
+        }
+        let out = format!("run{k}");
+        kills += u64::from(killed(&here, &arguments(&out), moment(&mut random)));
+        // Every other one is killed again while it goes on.
+        loop {
+            whole_rows(&here, &out);
+            opens(&here, &out);
+            if kills >= wanted || random.random_bool(0.5) {
+                break;
+            }
+            kills += u64::from(killed(&here, &["resume", &out], moment(&mut random)));
+        }
+        let said = here.grainscope(&["resume", &out]);
+        if said.code == Some(0) {
+            resumed += 1;
+        } else {
+            // Before the first checkpoint: said so, with what to do.
+            let checkpoints = here.path(&out).join("checkpoints");
+            let any = std::fs::read_dir(checkpoints).into_iter().flatten().flatten();
+            let whole = any.filter(|e| e.path().extension().is_some_and(|e| e == "state")).count();
+            assert_eq!(whole, 0, "{}", said.err);
+            restarted += 1;
+            here.grainscope(&[&arguments(&out)[..], &["--force"]].concat()).exits(0);
+        }
+        assert_eq!(here.json(&format!("{out}/summary.json"))["state_hash"], hash);
+        let table = Table::read(&here.read(&format!("{out}/series.csv")));
+        assert_eq!(table.without("wall"), whole.without("wall"));
+        assert_eq!(opens(&here, &out), whole.rows.len());
+        std::fs::remove_dir_all(here.path(&out)).expect("removed");
+    }
+    println!("{kills} kills: {resumed} runs resumed, {restarted} begun again, all to {hash}");
+}
+
+#[cfg(unix)]
+#[test]
+fn told_to_end_a_run_ends_within_a_step() {
+    let here = TempFolder::new();
+    here.grainscope(&arguments("whole")).exits(0);
+    let hash = here.json("whole/summary.json")["state_hash"].clone();
+    for signal in ["INT", "TERM", "HUP"] {
+        let run = arguments(signal);
+        let child = here
+            .command(&run)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let rows = || here.has(&format!("{signal}/series.csv")).then(|| whole_rows(&here, signal));
+        let patience = Instant::now();
+        while rows().is_none_or(|rows| rows < 4) {
+            assert!(patience.elapsed() < Duration::from_secs(60), "no steps are taken");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let id = child.id().to_string();
+        let signal_arg = format!("-{signal}");
+        assert!(Command::new("kill").args([&signal_arg, &id]).status().expect("kill").success());
+        let at_least = rows().expect("rows");
+        let said = Said::new(&run, child.wait_with_output().expect("an end")).exits(130);
+        said.prints(&["silo interrupted", &format!("grainscope resume {signal} goes on")]);
+        // The step under way was finished; another may have been before the signal was delivered.
+        assert!(rows().expect("rows") <= at_least + 2);
+        here.grainscope(&["resume", signal]).exits(0);
+        assert_eq!(here.json(&format!("{signal}/summary.json"))["state_hash"], hash);
+    }
+}
