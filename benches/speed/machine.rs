@@ -57,10 +57,10 @@ impl Machine {
 
 impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(
+        writeln!(
             f,
             "One thread of this machine: dense products {:.1} GFlop/s, reading {:.1} GB/s, \
-             copying {:.1} GB/s (read and written).\n",
+             copying {:.1} GB/s (read and written).",
             1e-9 * self.product,
             1e-9 * self.read,
             1e-9 * self.copy

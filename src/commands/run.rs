@@ -10,7 +10,7 @@ use crate::record::logger::{Backpressure, Logger, Traffic};
 use crate::record::rerun_log::{RerunLog, Served, Sink};
 use crate::record::run_plots::plots_of_run;
 use crate::record::series::SeriesWriter;
-use crate::record::summary::{Ending, Summary, Tally};
+use crate::record::summary::{Around, Ending, Summary, Tally};
 use crate::record::text::duration;
 use crate::record::{folder, info};
 use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash, to_toml};
@@ -238,13 +238,15 @@ impl Session {
         let series_file = folder.join("series.csv");
         let series =
             SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
+        let mut tally = Tally::new(run.row(), warnings);
+        tally.around.set_up = clock.elapsed().as_secs_f64() - run.row().seconds.total();
         Ok(Session {
             plan: plan.clone(),
             guard: Guard::new(args.safety.policy(), run.as_ref()),
             safety: args.safety,
             scene_hash: scene_hash(&plan.scene),
             kept: None,
-            tally: Tally::new(run.row(), warnings),
+            tally,
             run,
             folder,
             series,
@@ -453,7 +455,9 @@ impl Session {
             if self.bought.as_ref().is_some_and(|b| b.is_spent(&self.clock, self.run.row().wall)) {
                 return Ok(Ending::BudgetSpent);
             }
+            let clock = Instant::now();
             let faults = self.guard.step(self.run.as_mut())?;
+            self.tally.around.guard += clock.elapsed().as_secs_f64() - self.run.row().wall;
             let mut events = self.run.events().to_vec();
             for fault in faults {
                 self.note(fault.clone());
@@ -463,7 +467,9 @@ impl Session {
             watch(self.run.as_ref());
             let step = self.run.row().step;
             if self.safety.checkpoint_every.is_some_and(|n| step.is_multiple_of(n)) {
+                let clock = Instant::now();
                 self.checkpoint()?;
+                self.tally.around.writing += clock.elapsed().as_secs_f64();
             }
         }
         Ok(Ending::Finished)
@@ -471,6 +477,7 @@ impl Session {
 
     /// Writes down the current state.
     fn observe(&mut self, mut notes: Vec<String>) -> Result<(), Failure> {
+        let clock = Instant::now();
         let row = self.run.row().clone();
         let table = self.folder.join("series.csv");
         self.series.write(&row).map_err(|e| cannot(&table, e))?;
@@ -483,6 +490,7 @@ impl Session {
             let picture = due.then(|| self.run.picture());
             let wall = self.before.0 + self.clock.elapsed().as_secs_f64();
             let frame: Frame = info::frame(&self.plan, &row, wall, picture, notes);
+            self.tally.around.writing += clock.elapsed().as_secs_f64();
             if logger.send(frame).is_err() {
                 return Err(ended_early());
             }
@@ -703,6 +711,9 @@ impl Past {
                 t.first_energy,
                 traffic.waited.as_secs_f64(),
                 busy,
+                t.around.set_up,
+                t.around.guard,
+                t.around.writing,
             ],
         );
         state.put_counts("session.frames", [traffic.frames, traffic.drops, traffic.waits]);
@@ -719,7 +730,8 @@ impl Past {
     }
 
     fn load(state: &State, folder: &Path) -> Result<Past, StateError> {
-        let [wall, power, divergence, energy, waited, busy] = state.numbers("session.numbers")?;
+        let [wall, power, divergence, energy, waited, busy, set_up, guard, writing] =
+            state.numbers("session.numbers")?;
         let [frames, drops, waits] = state.tally("session.frames")?;
         let waited = Duration::try_from_secs_f64(waited).unwrap_or_default();
         let traffic = Traffic { frames, drops, waits, waited };
@@ -736,6 +748,7 @@ impl Past {
                 first_energy: energy,
                 traffic,
                 logger_seconds: busy,
+                around: Around { set_up, guard, writing },
                 warnings: vec![],
             },
             before: (wall, traffic, busy),

@@ -14,6 +14,7 @@ struct Moved {
     to: [f64; 2],
     left: bool,
     held: bool,
+    cell: u32,
     director: [f64; 2],
     stretch: f64,
 }
@@ -34,7 +35,7 @@ impl Divisible for Members<'_> {
     }
 }
 
-/// Moves all particles through a step. `particles` must be sorted; they are not afterwards.
+/// Moves all particles through a step. `particles` must be sorted, and are sorted afterwards.
 /// `compliant[m]`: volumes of material `m` follow the flow, and its particles keep their mass.
 pub fn advance(
     carrier: &Carrier,
@@ -55,7 +56,10 @@ pub fn advance(
             carrier.travel_all(cell, &particles.position[range.clone()], |k, journey| {
                 let p = range.start + k;
                 let moved = &mut members.moved[p - first];
-                (moved.to, moved.left, moved.held) = (journey.to, journey.left, journey.held);
+                (moved.left, moved.held) = (journey.left, journey.held);
+                moved.to = journey.to;
+                let arrived = || mesh.locate(mesh.wrap(journey.to));
+                moved.cell = journey.stays.unwrap_or_else(arrived) as u32;
                 if turning {
                     let l = carrier.gradient(journey.middle);
                     if let Some(director) = &particles.director {
@@ -89,9 +93,11 @@ pub fn advance(
             }
         }
     }
+    let stay = || moved.iter().filter(|m| !m.left);
     if moved.iter().any(|m| m.left) {
         let gone: Vec<bool> = moved.iter().map(|m| m.left).collect();
         count.left += gone.iter().filter(|&&g| g).count() as u64;
         particles.remove(&gone);
     }
+    particles.sort_into(mesh.cells(), stay().map(|m| m.cell));
 }

@@ -27,6 +27,7 @@
 //! correction and stays at 0.24, that of particles placed at random, with it.
 
 use crate::simd::{dispatch, multiply_add};
+use crate::space::mesh::INSIDE;
 use crate::space::shape::NODES;
 use nalgebra::Matrix2;
 
@@ -131,7 +132,7 @@ fn stage<const FMA: bool>(
         }
     }
     for p in 0..TOGETHER {
-        inside[p] &= at[0][p].abs() < 1.0 && at[1][p].abs() < 1.0;
+        inside[p] &= at[0][p].abs() < INSIDE && at[1][p].abs() < INSIDE;
     }
     at
 }

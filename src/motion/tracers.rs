@@ -1,6 +1,6 @@
 //! Dye: passive polylines, refined as they stretch so that they stay smooth.
 
-use super::carrier::Carrier;
+use super::carrier::{Carrier, Home};
 use crate::plan::Tracers;
 use crate::space::mesh::Mesh;
 
@@ -34,7 +34,7 @@ impl DyeLines {
             line.retain_mut(|p| {
                 let inside = mesh.wrap(*p);
                 let offset = [p[0] - inside[0], p[1] - inside[1]];
-                let journey = carrier.travel(mesh.locate(inside), inside);
+                let journey = carrier.travel(&Home::new(mesh, mesh.locate(inside)), inside);
                 *p = [journey.to[0] + offset[0], journey.to[1] + offset[1]];
                 !journey.left
             });

@@ -120,7 +120,19 @@ pub struct Tally {
     pub first_energy: f64,
     pub traffic: Traffic,
     pub logger_seconds: f64,
+    pub around: Around,
     pub warnings: Vec<String>,
+}
+
+/// Wall seconds around the steps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Around {
+    /// Filling cells, analysis of the mesh.
+    pub set_up: f64,
+    /// Examining steps and keeping the last good state.
+    pub guard: f64,
+    /// Rows, pictures, checkpoints.
+    pub writing: f64,
 }
 
 impl Tally {
@@ -134,6 +146,7 @@ impl Tally {
             first_energy: first.potential_energy,
             traffic: Traffic::default(),
             logger_seconds: 0.0,
+            around: Around::default(),
             warnings,
         }
     }
@@ -160,6 +173,9 @@ impl Summary {
         let count = run.count();
         let mut seconds: IndexMap<&str, f64> = tally.phases.list().into_iter().collect();
         seconds.insert("waiting_for_logger", tally.traffic.waited.as_secs_f64());
+        seconds.insert("set_up", tally.around.set_up);
+        seconds.insert("guard", tally.around.guard);
+        seconds.insert("writing", tally.around.writing);
         let known: f64 = seconds.values().sum();
         seconds.insert("other", (tally.wall - known).max(0.0));
         seconds.insert("total", tally.wall);

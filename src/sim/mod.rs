@@ -344,7 +344,6 @@ impl<const D: usize> Simulation<D> {
                 &mut self.gauges,
                 &mut self.count,
             );
-            self.particles.sort(&plan.mesh);
             if let Some(dye) = &mut self.dye {
                 let phase = Instant::now();
                 dye.advance(&carrier);
@@ -434,7 +433,6 @@ impl<const D: usize> Simulation<D> {
         let mut ignored = Count::default();
         for _ in 0..parts {
             advect::advance(&carrier, &mut ahead, &plan.effects, &compliant, &mut [], &mut ignored);
-            ahead.sort(&plan.mesh);
         }
         self.population.control(&plan.mesh, &mut ahead, &mut ignored);
         seconds.motion += phase.elapsed().as_secs_f64();

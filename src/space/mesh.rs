@@ -1,5 +1,12 @@
 //! The fixed tensor-product mesh: two axes of mesh lines, nodes of the biquadratic element, cells.
 
+/// Coordinates this near to a line, in cells, are on it: where a flow carries points along a line,
+/// rounding must not decide in which of two cells they are.
+pub const ON_LINE: f64 = 1e-10;
+
+/// Points so far inside a cell, in half cells, are in it whatever rounding does.
+pub const INSIDE: f64 = 1.0 - 1e-9;
+
 /// Mesh lines along one direction, ascending; a periodic axis joins its last line to its first.
 #[derive(Clone, Debug)]
 pub struct Axis {
@@ -68,7 +75,7 @@ impl Axis {
     }
 
     /// Cell that holds a coordinate; coordinates outside go to the nearest cell, one on a line
-    /// to the cell above it.
+    /// (or nearly, [`ON_LINE`]) to the cell above it.
     pub fn locate(&self, x: f64) -> usize {
         let b = ((x - self.lines[0]) * self.bins_per_length) as usize;
         let mut cell = self.bins[b.min(self.bins.len() - 1)] as usize;
@@ -78,16 +85,18 @@ impl Axis {
         while cell + 2 < self.lines.len() && x >= self.lines[cell + 1] {
             cell += 1;
         }
-        cell
+        let on_next = self.lines[cell + 1] - x <= ON_LINE * self.size(cell);
+        if on_next && cell + 2 < self.lines.len() { cell + 1 } else { cell }
     }
 
     /// Brings a coordinate of a periodic axis back into it.
     pub fn wrap(&self, x: f64) -> f64 {
-        if !self.periodic || (x >= self.start() && x < self.end()) {
+        let end = self.end() - ON_LINE * self.size(self.cells() - 1);
+        if !self.periodic || (x >= self.start() && x < end) {
             return x;
         }
         let wrapped = self.start() + (x - self.start()).rem_euclid(self.length());
-        if wrapped < self.end() { wrapped } else { self.start() }
+        if wrapped < end { wrapped } else { self.start() }
     }
 
     /// Index of the mesh line nearest to a coordinate.

@@ -134,16 +134,28 @@ impl Particles {
 
     /// Sorts by cell (stable counting sort) and fills `cell_start`.
     pub fn sort(&mut self, mesh: &Mesh) {
-        let Sorting { cells, next, order, .. } = &mut self.sorting;
+        let cells = &mut self.sorting.cells;
         cells.resize(self.position.len(), 0);
         let position = &self.position;
         threads::for_each(cells, GRAIN, |p, cell| *cell = mesh.locate(position[p]) as u32);
+        self.sort_by_cells(mesh.cells());
+    }
+
+    /// The same for `count` cells where each particle's is known.
+    pub fn sort_into(&mut self, count: usize, cells: impl Iterator<Item = u32>) {
+        self.sorting.cells.clear();
+        self.sorting.cells.extend(cells);
+        self.sort_by_cells(count);
+    }
+
+    fn sort_by_cells(&mut self, count: usize) {
+        let Sorting { cells, next, order, .. } = &mut self.sorting;
         self.cell_start.clear();
-        self.cell_start.resize(mesh.cells() + 1, 0);
+        self.cell_start.resize(count + 1, 0);
         for &c in &*cells {
             self.cell_start[c as usize + 1] += 1;
         }
-        for c in 0..mesh.cells() {
+        for c in 0..count {
             self.cell_start[c + 1] += self.cell_start[c];
         }
         if cells.is_sorted() {

@@ -1,6 +1,6 @@
 //! Walls as obstacles: what keeps particles and tracers on their side.
 
-use super::mesh::Mesh;
+use super::mesh::{Mesh, ON_LINE};
 
 /// A straight obstacle along a mesh line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,11 +56,11 @@ impl Enclosure {
             let first = self
                 .obstacles
                 .iter()
-                .filter_map(|w| w.crossing(p0, to).map(|t| (t, w)))
+                .filter_map(|w| w.crossing(mesh, p0, to).map(|t| (t, w)))
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, wall)) = first else { break };
             to[wall.normal] =
-                if p0[wall.normal] >= wall.at { wall.at } else { wall.at.next_down() };
+                if p0[wall.normal] >= wall.at { wall.at } else { wall.below(mesh).next_down() };
             held = true;
         }
         if held { Landing::Held(to) } else { Landing::Free(to) }
@@ -68,14 +68,23 @@ impl Enclosure {
 }
 
 impl Obstacle {
+    /// The largest coordinate below it that no cell above it counts as its own.
+    fn below(&self, mesh: &Mesh) -> f64 {
+        let axis = if self.normal == 0 { &mesh.x } else { &mesh.y };
+        let line = axis.nearest_line(self.at);
+        self.at - 2.0 * ON_LINE * axis.size(line.saturating_sub(1))
+    }
+
     /// Fraction of the path at which it passes through. A point on the line counts to the upper
-    /// side, as cells do.
-    fn crossing(&self, p0: [f64; 2], p1: [f64; 2]) -> Option<f64> {
+    /// side, as cells do; from below the wall is where that begins.
+    fn crossing(&self, mesh: &Mesh, p0: [f64; 2], p1: [f64; 2]) -> Option<f64> {
         let (a, b) = (p0[self.normal], p1[self.normal]);
-        if (a >= self.at) == (b >= self.at) {
+        let above = a >= self.at;
+        let plane = if above { self.at } else { self.below(mesh) };
+        if above == (b >= plane) {
             return None;
         }
-        let t = (self.at - a) / (b - a);
+        let t = if a == b { 0.0 } else { ((plane - a) / (b - a)).clamp(0.0, 1.0) };
         let along = p0[1 - self.normal] + t * (p1[1 - self.normal] - p0[1 - self.normal]);
         (along >= self.from && along <= self.to).then_some(t)
     }
@@ -98,7 +107,14 @@ mod tests {
         };
         let m = mesh();
         assert_eq!(e.follow(&m, [0.5, 1.5], [0.6, 0.7]), Landing::Held([0.6, 1.0]));
-        assert_eq!(e.follow(&m, [0.5, 0.5], [0.6, 1.7]), Landing::Held([0.6, 1f64.next_down()]));
+        let below = (1.0 - 2.0 * ON_LINE).next_down();
+        assert_eq!(e.follow(&m, [0.5, 0.5], [0.6, 1.7]), Landing::Held([0.6, below]));
+        assert_eq!(m.locate([0.6, below]), 0, "a point that a wall holds is on its side");
+        // A point that only comes near counts to the cell above the wall, and is held too.
+        assert_eq!(
+            e.follow(&m, [0.5, 0.5], [0.5, 1.0 - 0.1 * ON_LINE]),
+            Landing::Held([0.5, below])
+        );
         assert_eq!(e.follow(&m, [0.5, 1.0], [0.5, 0.9]), Landing::Held([0.5, 1.0]));
         assert_eq!(e.follow(&m, [1.5, 1.5], [1.4, 0.7]), Landing::Free([1.4, 0.7]));
         assert_eq!(e.follow(&m, [1.5, 1.5], [1.5, 2.7]), Landing::Held([1.5, 2.0]));
@@ -114,7 +130,7 @@ mod tests {
             open: [false, true, false, false],
         };
         let m = mesh();
-        let inside = [1f64.next_down(), 1f64.next_down()];
+        let inside = [(1.0 - 2.0 * ON_LINE).next_down(); 2];
         assert_eq!(e.follow(&m, [0.9, 0.8], [1.3, 1.4]), Landing::Held(inside));
         assert_eq!(e.follow(&m, [1.9, 1.8], [2.3, 1.4]), Landing::Left);
     }

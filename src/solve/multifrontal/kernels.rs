@@ -287,7 +287,7 @@ fn forward_kernel<const R: usize, const FMA: bool>(l: Columns, x: &mut [f64], re
         while j < width {
             let wide = part_of_panel(width - j);
             for (a, y) in [(below, &mut *ahead), (rim, &mut *rest)] {
-                let (a, x) = (a.from_column(j), &done[j..]);
+                let (a, x) = (a.after_columns(j), &done[j..]);
                 match wide {
                     8 => subtract_columns::<8, FMA>(a, x, y),
                     4 => subtract_columns::<4, FMA>(a, x, y),
@@ -314,7 +314,7 @@ fn part_of_panel(columns: usize) -> usize {
 
 impl<'a> Columns<'a> {
     #[inline(always)]
-    fn from_column(self, j: usize) -> Columns<'a> {
+    fn after_columns(self, j: usize) -> Columns<'a> {
         Columns { data: &self.data[(j * self.ld).min(self.data.len())..], ld: self.ld }
     }
 
@@ -360,7 +360,7 @@ fn backward_kernel<const R: usize, const FMA: bool>(l: Columns, x: &mut [f64], r
     let mut k = own;
     while k > 0 {
         // The narrow panel, if there is one, is the last.
-        let width = if k % PANEL == 0 { PANEL } else { k % PANEL };
+        let width = if k.is_multiple_of(PANEL) { PANEL } else { k % PANEL };
         k -= width;
         let (done, ahead) = x[k..].split_at_mut(width);
         let top = &l.data[k * l.ld + k..];
@@ -370,7 +370,7 @@ fn backward_kernel<const R: usize, const FMA: bool>(l: Columns, x: &mut [f64], r
         while j < width {
             let wide = part_of_panel(width - j);
             for (a, y) in [(below, &*ahead), (rim, rest)] {
-                let (a, x) = (a.from_column(j), &mut done[j..]);
+                let (a, x) = (a.after_columns(j), &mut done[j..]);
                 match wide {
                     8 => subtract_products::<8, FMA>(a, y, x),
                     4 => subtract_products::<4, FMA>(a, y, x),
