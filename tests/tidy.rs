@@ -15,7 +15,7 @@ const ROOMS: [(&str, &[&str]); 21] = [
     ("plan", &["laws", "scene", "space"]),
     ("solve", &["laws", "scene", "space", "plan", "threads", "simd"]),
     ("motion", &["laws", "space", "plan", "threads", "simd"]),
-    ("sim", &["laws", "frame", "scene", "space", "plan", "solve", "motion"]),
+    ("sim", &["laws", "frame", "scene", "space", "plan", "solve", "motion", "threads"]),
     ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
     ("verify", &["scene", "plan", "sim", "cases"]),
     ("cost", &["scene", "space", "plan", "sim", "cases", "testing", "threads"]),

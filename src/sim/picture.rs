@@ -8,6 +8,10 @@ use crate::scene::{ColourBy, FieldName};
 use crate::space::flow::{gradient, interpolate};
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
+use crate::threads;
+
+/// Samples of a field that are worth a task of their own.
+const SAMPLE_GRAIN: usize = 2048;
 
 /// Samples of a field along the longer side of the domain.
 const FIELD_SAMPLES: f64 = 240.0;
@@ -202,7 +206,9 @@ impl<const D: usize> Simulation<D> {
                     FieldName::Rotation => "rotation",
                     _ => "pressure",
                 };
-                (title, (0..raster.len()).map(value).collect())
+                let mut values = vec![0.0; raster.len()];
+                threads::for_each(&mut values, SAMPLE_GRAIN, |k, v| *v = value(k));
+                (title, values)
             }
         };
         let range = match name {

@@ -329,20 +329,19 @@ fn closest_pair(
 ) -> Option<(usize, usize)> {
     let [hx, hy] = mesh.cell_size(cell);
     let marked = |p: usize| particles.mark.as_ref().is_some_and(|m| m[p]);
-    let mut pairs = Vec::new();
-    for (k, &a) in members.iter().enumerate() {
-        for &b in &members[k + 1..] {
-            if particles.material[a] != particles.material[b] || marked(a) != marked(b) {
-                continue;
-            }
-            let (pa, pb) = (particles.position[a], particles.position[b]);
-            let r2 = ((pa[0] - pb[0]) / hx).powi(2) + ((pa[1] - pb[1]) / hy).powi(2);
-            let (va, vb) = (particles.volume[a], particles.volume[b]);
-            let cost = r2 * va * vb / (va + vb);
-            pairs.push((cost, from_middle(mesh, pa) + from_middle(mesh, pb), (a, b)));
-        }
-    }
-    cheapest(pairs.into_iter())
+    let pairs = members
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &a)| members[k + 1..].iter().map(move |&b| (a, b)));
+    let kin = pairs
+        .filter(|&(a, b)| particles.material[a] == particles.material[b] && marked(a) == marked(b));
+    cheapest(kin.map(|(a, b)| {
+        let (pa, pb) = (particles.position[a], particles.position[b]);
+        let r2 = ((pa[0] - pb[0]) / hx).powi(2) + ((pa[1] - pb[1]) / hy).powi(2);
+        let (va, vb) = (particles.volume[a], particles.volume[b]);
+        let cost = r2 * va * vb / (va + vb);
+        (cost, from_middle(mesh, pa) + from_middle(mesh, pb), (a, b))
+    }))
 }
 
 impl Particles {

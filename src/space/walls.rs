@@ -80,6 +80,11 @@ impl Obstacle {
     fn crossing(&self, mesh: &Mesh, p0: [f64; 2], p1: [f64; 2]) -> Option<f64> {
         let (a, b) = (p0[self.normal], p1[self.normal]);
         let above = a >= self.at;
+        let axis = if self.normal == 0 { &mesh.x } else { &mesh.y };
+        if !above && b < self.at - 2.0 * ON_LINE * axis.length() {
+            // Most paths are far from most walls: no need to know where exactly this one begins.
+            return None;
+        }
         let plane = if above { self.at } else { self.below(mesh) };
         if above == (b >= plane) {
             return None;

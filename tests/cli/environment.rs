@@ -218,9 +218,12 @@ fn a_run_is_the_same_however_it_is_watched() {
     let here = TempFolder::new();
     let steps = ["--steps", "6"];
     // Whatever must not change a result belongs here.
-    let ways: [&[&str]; 6] = [
+    let ways: [&[&str]; 9] = [
         &[],
         &[],
+        &["--threads", "1"],
+        &["--threads", "2"],
+        &["--threads", "4"],
         &["--no-recording"],
         &["--checkpoint-every", "1"],
         &["--on-fault", "stop", "--profile"],
