@@ -1,8 +1,9 @@
 //! `grainscope doctor`: what a bug report needs.
 
-use super::memory::{available, size};
+use super::memory::available;
 use super::{Failure, print};
 use crate::cost::Machine;
+use crate::plan::memory::size;
 use crate::record::checkpoint;
 use indexmap::IndexMap;
 use std::net::{Ipv4Addr, TcpListener};

@@ -1,62 +1,9 @@
-//! What a run will need of the machine's memory, and whether it is there.
+//! Whether the machine has the memory that a run will need.
 
 use super::Failure;
 use crate::plan::Plan;
+use crate::plan::memory::{Memory, size};
 use sysinfo::System;
-
-/// Measured at 128 x 128 cells with two unknowns a node: the factor, and what the factorisation
-/// keeps on the way. Both grow as `n log n` under nested dissection.
-const SOLVER_BYTES: f64 = (96e6 + 250e6) / (16_384.0 * 14.0);
-/// As much more with rotation: `(3/2)^2` entries, less what has no rotation.
-const ROTATION: f64 = 2.2;
-/// Integration points, element matrices and vectors of a cell.
-const CELL_BYTES: f64 = 6e3;
-/// Columns of a particle: as it is, half a step ahead, and at the last good state.
-const PARTICLE_BYTES: f64 = 3.0 * 80.0;
-/// The program itself, recording and plots.
-const BASE: f64 = 100e6;
-
-/// Bytes that a run needs, about.
-#[derive(Clone, Copy, Debug)]
-pub struct Memory {
-    solver: f64,
-    cells: f64,
-    particles: f64,
-}
-
-impl Memory {
-    pub fn of(plan: &Plan) -> Memory {
-        let n = plan.mesh.cells() as f64;
-        let rotation = if plan.effects.rotation { ROTATION } else { 1.0 };
-        Memory {
-            solver: SOLVER_BYTES * n * n.log2().max(1.0) * rotation,
-            cells: CELL_BYTES * n,
-            particles: PARTICLE_BYTES * n * plan.method.seeding.count() as f64,
-        }
-    }
-
-    fn total(&self) -> f64 {
-        BASE + self.solver + self.cells + self.particles
-    }
-}
-
-impl std::fmt::Display for Memory {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{} of memory (solver {}, cells {}, particles {})",
-            size(self.total()),
-            size(self.solver),
-            size(self.cells),
-            size(self.particles)
-        )
-    }
-}
-
-/// Bytes, in words.
-pub fn size(bytes: f64) -> String {
-    if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
-}
 
 /// Bytes that this program may still take; `None` if nobody knows.
 pub fn available() -> Option<f64> {

@@ -1,8 +1,9 @@
 //! `grainscope plan`: which effects are solved, why, and what each takes of a step.
 
-use super::memory::{self, Memory};
+use super::memory;
 use super::{Failure, print, tell};
 use crate::cost::effects;
+use crate::plan::memory::Memory;
 use crate::record::text::plan_text;
 use std::sync::Arc;
 

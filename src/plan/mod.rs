@@ -9,6 +9,7 @@ pub mod boundary;
 mod change;
 mod effects;
 pub mod material;
+pub mod memory;
 mod meshing;
 mod resolve;
 pub mod units;

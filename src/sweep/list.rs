@@ -1,8 +1,9 @@
 //! `cases.json`: every case of a sweep with its id and its values.
 
 use super::vary::{self, Range, Values, Vary};
-use super::{Spec, SweepError, need};
+use super::{Spec, SweepError};
 use crate::plan;
+use crate::plan::memory::Memory;
 use crate::scene::{Placement, Quantity, Scene, SceneError, SceneSource, Scope, parse, scene_hash};
 use indexmap::{IndexMap, IndexSet};
 use serde::{Deserialize, Serialize};
@@ -244,7 +245,7 @@ fn case(
         sets,
         end: plan_of.clock.end * plan_of.units.time,
         unknowns: plan.unknowns_per_node() * plan.mesh.nodes() + 3 * plan.mesh.cells(),
-        memory: need::memory(&plan),
+        memory: Memory::of(&plan).total() as u64,
     })
 }
 

@@ -9,7 +9,6 @@ pub mod collect;
 mod hq;
 mod list;
 mod local;
-mod need;
 mod spec;
 mod store;
 mod vary;

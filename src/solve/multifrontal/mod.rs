@@ -1,15 +1,15 @@
 //! Multifrontal Cholesky factorisation of the skeleton matrix of a structured mesh.
 //!
 //! The matrix is never assembled. Every cell hands in its element matrix; the fronts of the
-//! dissection ([`tree`]) add up the matrices of their cells or their children's updates, eliminate
-//! their own unknowns ([`front`]) and hand an update on. With 2 or 3 unknowns a node a mesh of `N`
+//! dissection (`tree.rs`) add up the matrices of their cells or their children's updates, eliminate
+//! their own unknowns (`front.rs`) and hand an update on. With 2 or 3 unknowns a node a mesh of `N`
 //! cells has `O(N log N)` entries in the factor and takes `O(N^1.5)` operations.
 //!
 //! **Only what changed is factored again.** A front whose cells all handed in the same matrix, bit
 //! for bit, as before keeps its part of the factor and its update; those above cells that changed
 //! are redone, with the same operations in the same order as if all were: the factor does not
-//! depend on what was kept. Updates of rectangles below [`KEPT_SIDE`] cells are not
-//! kept: there a rectangle is redone whole, in memory that stays in the cache.
+//! depend on what was kept. Updates of rectangles below 8 cells are not kept: there a rectangle is
+//! redone whole, in memory that stays in the cache.
 //!
 //! **Threads** take subtrees of their own. Sums have one order, so that no bit of the result depends
 //! on their number.
