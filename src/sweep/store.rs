@@ -1,9 +1,11 @@
 //! The folder of a sweep, and what is done in it.
 //!
-//!     cases.json scene.toml     what is to be run
-//!     cases/<id>                finished runs: they appear whole, by one renaming
-//!     failed/<id>               what a failed run has left, with its cause
-//!     running/<id>              runs in the making, each under a lock
+//! ```text
+//! cases.json scene.toml     what is to be run
+//! cases/<id>                finished runs: they appear whole, by one renaming
+//! failed/<id>               what a failed run has left, with its cause
+//! running/<id>              runs in the making, each under a lock
+//! ```
 
 use super::{Case, List, SweepError};
 use crate::scene::SceneSource;
