@@ -1,9 +1,8 @@
 //! `grainscope doctor`: what a bug report needs.
 
-use super::memory::available;
 use super::{Failure, print};
 use crate::cost::Machine;
-use crate::plan::memory::size;
+use crate::plan::memory::{available, size};
 use crate::record::checkpoint;
 use indexmap::IndexMap;
 use std::net::{Ipv4Addr, TcpListener};

@@ -1,6 +1,7 @@
-//! What a run will need of a machine's memory, estimated beforehand.
+//! What a run will need of a machine's memory, estimated beforehand, and what there is.
 
 use crate::plan::Plan;
+use sysinfo::System;
 
 /// Factor and updates that are kept, per cell and doubling of the mesh, with two unknowns a node: 860
 /// at 128 x 128 cells, 950 at 256 x 256 (`cargo bench --bench speed` prints both).
@@ -56,4 +57,16 @@ impl std::fmt::Display for Memory {
 /// Bytes, in words.
 pub fn size(bytes: f64) -> String {
     if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
+}
+
+/// Bytes that this program may still take; `None` if nobody knows.
+pub fn available() -> Option<f64> {
+    let mut system = System::new();
+    system.refresh_memory();
+    let free = system.available_memory();
+    // A container may have less than its machine. What its file cache holds is given back when asked
+    // for: only what programs hold counts.
+    let limit = system.cgroup_limits().map(|l| l.total_memory.saturating_sub(l.rss));
+    let least = limit.filter(|&l| l > 0).map_or(free, |l| l.min(free));
+    (least > 0).then_some(least as f64)
 }

@@ -1,6 +1,7 @@
 //! The local engine: processes of this program, as many as the machine holds.
 
 use super::{Case, Engine, Event, State, SweepError, THREADS, Work};
+use crate::plan::memory::available;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -31,16 +32,11 @@ impl Limits {
     /// All cores and most of the free memory of this machine.
     pub fn of_machine(jobs: Option<usize>, threads: usize) -> Limits {
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let mut system = sysinfo::System::new();
-        system.refresh_memory();
-        let free = system.available_memory();
-        // In a container the machine's memory is not all ours; files it has cached count as free.
-        let limit = |c: sysinfo::CGroupLimits| free.min(c.total_memory.saturating_sub(c.rss));
-        let ours = system.cgroup_limits().map_or(free, limit);
+        let ours = available().unwrap_or(f64::INFINITY);
         Limits {
             jobs: jobs.unwrap_or((cores / threads.max(1)).max(1)),
             threads,
-            memory: (MEMORY_SHARE * ours as f64) as u64,
+            memory: (MEMORY_SHARE * ours) as u64,
         }
     }
 
