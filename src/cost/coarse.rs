@@ -4,7 +4,7 @@ use super::CostError;
 use super::knobs::cells_near;
 use super::list::Growth;
 use super::measure::{Pilot, Sample, Target, run};
-use super::survey::planned;
+use super::survey::{ROUNDING, planned};
 use crate::scene::{Scene, SceneSource};
 
 /// Cells of the meshes, relative to the scene's own.
@@ -12,9 +12,6 @@ const COARSE: [f64; 2] = [1.0 / 3.0, 0.5];
 
 /// Seconds of a pilot.
 const PATIENCE: f64 = 0.3;
-
-/// Differences below this are rounding.
-const ROUNDING: f64 = 1e-12;
 
 /// Two coarse runs to the end of the scene.
 pub struct Coarse {

@@ -86,7 +86,7 @@ const LEAST_STEPS: f64 = 6.0;
 const COARSE_SHARE: f64 = 0.25;
 
 /// Errors below this are rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// A candidate that ran.
 struct Ran {

@@ -101,12 +101,7 @@ fn a_full_disk_is_named_and_the_run_goes_on_when_there_is_room() {
 fn a_folder_that_is_gone_is_named() {
     let here = TempFolder::new();
     let run = arguments("gone", &["--checkpoint-every", "2"]);
-    let child = here
-        .command(&run)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
+    let child = here.start(&run);
     wait_for_rows(&here, "gone", 2);
     // Files may be made in it meanwhile.
     let clock = Instant::now();
@@ -145,12 +140,7 @@ fn rights_that_lack_are_named() {
 fn nobody_who_listens_is_no_fault() {
     let here = TempFolder::new();
     // Both ends of both pipes are closed before anything is said.
-    let mut child = here
-        .command(&arguments("run", &["--steps", "2"]))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
+    let mut child = here.start(&arguments("run", &["--steps", "2"]));
     drop((child.stdout.take(), child.stderr.take()));
     assert_eq!(child.wait().expect("an end").code(), Some(0));
     assert_eq!(here.json("run/summary.json")["steps"], 2);
@@ -184,12 +174,7 @@ fn a_viewer_that_dies_does_not_take_the_run_with_it() {
     let url = format!("rerun+http://127.0.0.1:{port}/proxy");
     here.grainscope(&arguments("whole", &["--no-recording"])).exits(0);
     let run = arguments("run", &["--connect", &url]);
-    let child = here
-        .command(&run)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
+    let child = here.start(&run);
     wait_for_rows(&here, "run", 2);
     viewer.kill().expect("killed");
     viewer.wait().expect("an end");

@@ -17,7 +17,6 @@ use rand_pcg::Pcg64Mcg;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::process::Stdio;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -305,12 +304,8 @@ fn recordings() {
 #[test]
 fn requests() {
     let here = TempFolder::new();
-    let mut child = here
-        .command(&["explore", "couette_cosserat", "--paused", "--set", "accuracy.cells=4"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
+    let mut child =
+        here.start(&["explore", "couette_cosserat", "--paused", "--set", "accuracy.cells=4"]);
     let mut url = String::new();
     let mut out = std::io::BufReader::new(child.stdout.take().expect("piped"));
     std::io::BufRead::read_line(&mut out, &mut url).expect("a line");

@@ -134,12 +134,7 @@ fn told_to_end_a_run_ends_within_a_step() {
     let hash = here.json("whole/summary.json")["state_hash"].clone();
     for signal in ["INT", "TERM", "HUP"] {
         let run = arguments(signal);
-        let child = here
-            .command(&run)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
+        let child = here.start(&run);
         let rows = || here.has(&format!("{signal}/series.csv")).then(|| whole_rows(&here, signal));
         let patience = Instant::now();
         while rows().is_none_or(|rows| rows < 4) {

@@ -16,7 +16,7 @@ mod sweep;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 
 /// A folder that is gone when the test is.
 struct TempFolder(grainscope::testing::TempFolder);
@@ -52,6 +52,13 @@ impl TempFolder {
         let mut command = Command::new(env!("CARGO_BIN_EXE_grainscope"));
         command.args(arguments).current_dir(self.0.path()).env("NO_COLOR", "1");
         command
+    }
+
+    /// The program, started in this folder; its words are kept for who waits for it.
+    fn start(&self, arguments: &[&str]) -> Child {
+        let mut command = self.command(arguments);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().expect("the program starts")
     }
 
     fn grainscope(&self, arguments: &[&str]) -> Said {

@@ -1,7 +1,6 @@
 //! What a run writes, where, and how it ends.
 
 use super::*;
-use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 const HEADER: &str = "step,time,dt,dt_limiter,wall,power_in,dissipation,power_error,\
@@ -269,12 +268,7 @@ fn a_shorter_run_ends_where_it_is_told() {
 fn an_interrupted_run_is_closed_in_order() {
     let here = TempFolder::new();
     let run = ["run", "silo", "--set", "accuracy.cells=8", "--out", "out"];
-    let child = here
-        .command(&run)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
+    let child = here.start(&run);
     let rows =
         || std::fs::read_to_string(here.path("out/series.csv")).map_or(0, |t| t.lines().count());
     let patience = Instant::now();
