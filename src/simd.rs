@@ -5,17 +5,62 @@
 //! time, so one program runs on all of them. Sums may differ in the last place between instruction
 //! sets, never between runs on one.
 
-/// Instruction sets that kernels are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+use std::sync::OnceLock;
+
+/// Instruction sets that kernels are compiled for, the least first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Simd {
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
+    Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
+/// The variable of the environment that names the set kernels use, where no option does.
+pub const VARIABLE: &str = "GRAINSCOPE_SIMD";
+
+/// The most that kernels may use, if it was limited.
+static LIMIT: OnceLock<Simd> = OnceLock::new();
+
 impl Simd {
+    /// Sets that kernels are compiled for on this kind of processor, by name.
+    pub const NAMES: &[(&str, Simd)] = &[
+        ("portable", Simd::Portable),
+        #[cfg(target_arch = "x86_64")]
+        ("avx2", Simd::Avx2),
+        #[cfg(target_arch = "x86_64")]
+        ("avx512", Simd::Avx512),
+    ];
+
+    /// The name of this set.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|named| named.1 == self).map_or("portable", |named| named.0)
+    }
+
+    /// What kernels use: the best that this processor has, unless [`Simd::limit`] chose less.
+    pub fn used() -> Self {
+        Self::limited().unwrap_or_else(Self::detect)
+    }
+
+    /// What [`Simd::limit`] chose.
+    pub fn limited() -> Option<Self> {
+        LIMIT.get().copied()
+    }
+
+    /// Chooses the set that kernels use from now on in this process. The first choice stays.
+    ///
+    /// # Errors
+    /// The best set that this processor has, if that is less.
+    pub fn limit(set: Simd) -> Result<(), Simd> {
+        let best = Self::detect();
+        if set > best {
+            return Err(best);
+        }
+        LIMIT.get_or_init(|| set);
+        Ok(())
+    }
+
     /// The best that this processor has.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]

@@ -23,13 +23,13 @@ const ROOMS: [(&str, &[&str]); 21] = [
     ("stress", &["scene", "plan", "sim", "cases", "verify", "space", "threads"]),
     ("compare", &["frame", "scene", "plan", "record"]),
     ("export", &["frame", "compare"]),
-    ("sweep", &["scene", "plan", "record", "testing"]),
+    ("sweep", &["scene", "plan", "record", "testing", "simd"]),
     ("explorer", &["frame", "scene", "plan", "sim", "cost", "record", "stress"]),
     (
         "commands",
         &[
             "frame", "scene", "plan", "sim", "cases", "verify", "cost", "stress", "record",
-            "compare", "explorer", "sweep", "export",
+            "compare", "explorer", "sweep", "export", "simd",
         ],
     ),
 ];

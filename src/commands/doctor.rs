@@ -4,6 +4,7 @@ use super::{Failure, print};
 use crate::cost::Machine;
 use crate::plan::memory::{available, size};
 use crate::record::checkpoint;
+use crate::simd::Simd;
 use indexmap::IndexMap;
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
@@ -47,6 +48,7 @@ fn facts(args: &Args) -> IndexMap<&'static str, String> {
         ("system", format!("{system}, {}", std::env::consts::ARCH)),
         ("processor", machine.processor),
         ("features", processor_features().join(" ")),
+        ("vectors", vectors()),
         ("threads", threads()),
         ("memory", memory),
         ("disk", disk(args)),
@@ -75,6 +77,15 @@ fn processor_features() -> Vec<&'static str> {
     #[cfg(target_arch = "aarch64")]
     found.push("neon");
     found
+}
+
+/// The instruction set of our own kernels.
+fn vectors() -> String {
+    let (used, best) = (Simd::used(), Simd::detect());
+    if used == best {
+        return used.name().to_owned();
+    }
+    format!("{}, though this processor has {}", used.name(), best.name())
 }
 
 fn threads() -> String {

@@ -26,6 +26,7 @@ use crate::record::plots::PlotError;
 use crate::record::rerun_log::RecordError;
 use crate::scene::{self, Scene, SceneError, SceneSource};
 use crate::sim::SimError;
+use crate::simd::{self, Simd};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::Path;
 use std::process::ExitCode;
@@ -75,6 +76,16 @@ struct Cli {
     /// Threads that compute, by default one per processor; no result depends on them
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// The instruction set that kernels use: by default the best that the processor has; results differ
+    /// in their last digits between sets, and runs of two machines are the same on one that both have
+    #[arg(long, global = true, value_name = "SET", value_parser = instruction_set)]
+    simd: Option<Simd>,
+}
+
+fn instruction_set(name: &str) -> Result<Simd, String> {
+    let found = Simd::NAMES.iter().find(|named| named.0 == name);
+    let names = || Simd::NAMES.iter().map(|named| named.0).collect::<Vec<_>>().join(", ");
+    found.map(|named| named.1).ok_or_else(|| format!("expected one of {}", names()))
 }
 
 #[derive(Subcommand)]
@@ -200,8 +211,9 @@ impl Failure {
 
 /// Reads the arguments, does what they say, and gives the exit code.
 pub fn main() -> ExitCode {
-    let Cli { command, threads } = Cli::parse();
-    let outcome = set_threads(threads).and_then(|()| run_command(command));
+    let Cli { command, threads, simd } = Cli::parse();
+    let outcome =
+        set_threads(threads).and_then(|()| set_simd(simd)).and_then(|()| run_command(command));
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -216,6 +228,19 @@ fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
     let Some(n) = threads else { return Ok(()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n));
     pool.build_global().map_err(|e| Failure::Environment(format!("cannot start {n} threads: {e}")))
+}
+
+fn set_simd(set: Option<Simd>) -> Result<(), Failure> {
+    let by_environment = || {
+        let name = std::env::var(simd::VARIABLE).ok()?;
+        let wrong = |e| Failure::Environment(format!("{} is `{name}`: {e}", simd::VARIABLE));
+        Some(instruction_set(&name).map_err(wrong))
+    };
+    let Some(set) = set.map(Ok).or_else(by_environment).transpose()? else { return Ok(()) };
+    Simd::limit(set).map_err(|best| {
+        let (set, best) = (set.name(), best.name());
+        Failure::Environment(format!("this processor has no {set}: the best it has is {best}"))
+    })
 }
 
 fn run_command(command: Command) -> Result<(), Failure> {

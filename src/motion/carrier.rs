@@ -62,7 +62,7 @@ impl<'a> Carrier<'a> {
             let nodal = mesh.cell_nodes(cell).map(|n| velocity[n]);
             *current = Current::new(&nodal, mesh.cell_size(cell));
         });
-        Carrier { mesh, enclosure, dt, currents, simd: Simd::detect() }
+        Carrier { mesh, enclosure, dt, currents, simd: Simd::used() }
     }
 
     /// Velocity at a place reached from `p`, walls and periodic sides respected, and where it

@@ -17,6 +17,7 @@
 
 mod bar;
 mod blueprint;
+mod decode;
 mod mend;
 mod race;
 mod read;

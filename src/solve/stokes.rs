@@ -261,7 +261,7 @@ impl<const D: usize> Stokes<D> {
             matrices: Matrices::new(mesh.cells()),
             factor: Multifrontal::new(tree, mesh.cells()),
             diagonal: vec![[0.0; D]; mesh.nodes()],
-            simd: Simd::detect(),
+            simd: Simd::used(),
             work: Work::default(),
             mesh,
             constraints,

@@ -3,7 +3,7 @@
 //! One job file with a task for each case is written and submitted with `hq job submit-file`; then
 //! `hq job wait` is watched. No `max_fails` stands in it: a task that fails cancels no other.
 
-use super::{Case, Engine, Event, State, SweepError, THREADS, Work};
+use super::{Case, Engine, Event, State, SweepError, Work, environment};
 use indexmap::IndexMap;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -93,7 +93,7 @@ impl HyperQueue {
             cwd: root.to_owned(),
             stdout: root.join("hq").join(format!("{}.out", case.id)),
             stderr: root.join("hq").join(format!("{}.err", case.id)),
-            env: [(THREADS, self.threads.to_string())].into_iter().collect(),
+            env: environment(self.threads),
             crash_limit: CRASH_LIMIT,
             request: vec![Request {
                 resources: [

@@ -1,6 +1,6 @@
 //! The local engine: processes of this program, as many as the machine holds.
 
-use super::{Case, Engine, Event, State, SweepError, THREADS, Work};
+use super::{Case, Engine, Event, State, SweepError, Work, environment};
 use crate::plan::memory::available;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -113,7 +113,7 @@ impl Local {
             .args(["sweep", "case", "--stop-with-input"])
             .arg(work.store.root())
             .arg(&case.id)
-            .env(THREADS, self.limits.threads.to_string())
+            .envs(environment(self.limits.threads))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());

@@ -21,6 +21,8 @@ pub use store::{Attempt, State, Store};
 pub use vary::{Sample, values_of};
 
 use crate::scene::SceneError;
+use crate::simd::{self, Simd};
+use indexmap::IndexMap;
 use std::path::PathBuf;
 
 /// Why a sweep cannot go on; a case that fails is none of these.
@@ -79,5 +81,10 @@ pub trait Engine {
     fn run(&self, work: &mut Work) -> Result<(), SweepError>;
 }
 
-/// Threads of a case: what its solver and its helpers may take.
-const THREADS: &str = "RAYON_NUM_THREADS";
+/// What a case's program is told by its environment: the threads that it may take, and the instruction
+/// set if ours is limited.
+fn environment(threads: usize) -> IndexMap<&'static str, String> {
+    let threads = Some(("RAYON_NUM_THREADS", threads.to_string()));
+    let set = Simd::limited().map(|set| (simd::VARIABLE, set.name().to_owned()));
+    threads.into_iter().chain(set).collect()
+}

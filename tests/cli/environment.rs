@@ -1,7 +1,9 @@
 //! Disks, folders, rights, pipes, viewers and ports that fail, each tried for real.
 
 use super::*;
-use std::process::Stdio;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -154,43 +156,143 @@ fn nobody_who_listens_is_no_fault() {
     assert_eq!(child.wait().expect("an end").code(), Some(3));
 }
 
-#[test]
-fn a_viewer_that_dies_does_not_take_the_run_with_it() {
-    let here = TempFolder::new();
-    // A viewer's server: the page of a run that is over.
-    let mut viewer = here
-        .command(&["run", "couette_cosserat", "--steps", "0", "--no-recording", "--serve"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
-    let mut said = String::new();
-    let mut out = std::io::BufReader::new(viewer.stderr.take().expect("piped"));
-    while !said.contains("proxy") {
-        let read = std::io::BufRead::read_line(&mut out, &mut said).expect("a line");
-        assert!(read > 0, "{said}");
+/// A viewer's server: the page of a run that is over.
+struct Viewer {
+    program: Child,
+    port: u16,
+}
+
+impl Viewer {
+    fn start(here: &TempFolder) -> Viewer {
+        let mut program = here
+            .command(&["run", "couette_cosserat", "--steps", "0", "--no-recording", "--serve"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut said = String::new();
+        let mut out = std::io::BufReader::new(program.stderr.take().expect("piped"));
+        while !said.contains("proxy") {
+            let read = std::io::BufRead::read_line(&mut out, &mut said).expect("a line");
+            assert!(read > 0, "{said}");
+        }
+        let port = said.split("%3A").last().and_then(|s| s.split("%2F").next()).expect("a port");
+        Viewer { program, port: port.parse().expect("a number") }
     }
-    let port = said.split("%3A").last().and_then(|s| s.split("%2F").next()).expect("a port");
-    let url = format!("rerun+http://127.0.0.1:{port}/proxy");
+
+    fn kill(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+fn address(port: u16) -> String {
+    format!("rerun+http://127.0.0.1:{port}/proxy")
+}
+
+/// A line to a viewer that carries so many bytes a second, and no more than some in all; its port.
+fn slow_line(viewer: &Viewer, rate: f64, most: usize) -> u16 {
+    let pass = |mut from: TcpStream, mut to: TcpStream, rate: f64, most: usize| {
+        std::thread::spawn(move || {
+            let (mut bytes, mut passed) = ([0; 2048], 0);
+            while passed < most {
+                let Ok(n @ 1..) = from.read(&mut bytes) else { return };
+                passed += n;
+                std::thread::sleep(Duration::from_secs_f64(n as f64 / rate));
+                if to.write_all(&bytes[..n]).is_err() {
+                    return;
+                }
+            }
+            // Stays open, and takes nothing more.
+            std::thread::sleep(PATIENCE);
+        });
+    };
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port();
+    let far = viewer.port;
+    std::thread::spawn(move || {
+        for near in listener.incoming().flatten() {
+            let Ok(far) = TcpStream::connect(("127.0.0.1", far)) else { return };
+            let (Ok(a), Ok(b)) = (near.try_clone(), far.try_clone()) else { return };
+            pass(a, b, rate, most);
+            pass(far, near, f64::INFINITY, usize::MAX);
+        }
+    });
+    port
+}
+
+/// The recording of a run has a row for every step of its table.
+fn recorded_whole(here: &TempFolder, run: &str) {
+    let rows = Table::read(&here.read(&format!("{run}/series.csv"))).rows.len();
+    let store = recording::recording(&here.path(&format!("{run}/recording.rrd")));
+    assert_eq!(recording::steps(&store).len(), rows);
+}
+
+#[test]
+fn a_viewer_that_dies_or_sticks_does_not_take_the_run_with_it() {
+    let here = TempFolder::new();
+    let mut viewer = Viewer::start(&here);
+    let hash = |run: &str| here.json(&format!("{run}/summary.json"))["state_hash"].clone();
     here.grainscope(&arguments("whole", &["--no-recording"])).exits(0);
+    // It sticks after some pictures.
+    let port = slow_line(&viewer, f64::INFINITY, 400_000);
+    let said = here.grainscope(&arguments("stuck", &["--connect", &address(port)])).exits(0);
+    said.complains(&["warning: the viewer at rerun+http://127.0.0.1"]);
+    assert_eq!(hash("stuck"), hash("whole"));
+    recorded_whole(&here, "stuck");
+    // It is killed.
+    let url = address(viewer.port);
     let run = arguments("run", &["--connect", &url]);
     let child = here.start(&run);
     wait_for_rows(&here, "run", 2);
-    viewer.kill().expect("killed");
-    viewer.wait().expect("an end");
+    viewer.kill();
     let said = Said::new(&run, child.wait_with_output().expect("an end")).exits(0);
     said.complains(&["warning: the viewer at rerun+http://127.0.0.1"]);
-    let summary = here.json("run/summary.json");
-    assert_eq!(summary["state_hash"], here.json("whole/summary.json")["state_hash"]);
-    let rows = Table::read(&here.read("run/series.csv")).rows.len();
-    let store = recording::recording(&here.path("run/recording.rrd"));
-    assert_eq!(recording::steps(&store).len(), rows);
+    assert_eq!(hash("run"), hash("whole"));
+    recorded_whole(&here, "run");
+}
+
+/// Of what is recorded nothing is lost, however slow a viewer is; of what is only watched the oldest
+/// is dropped, and counted.
+#[test]
+fn a_slow_viewer_loses_only_what_may_be_lost() {
+    let here = TempFolder::new();
+    let viewer = Viewer::start(&here);
+    // Many small pictures, faster than they can be shown.
+    let scene = ["run", "couette_cosserat", "--set", "accuracy.cells=8"];
+    let pace = ["--set", "time.max_step=2e-4", "--set", "recording.frames=100000"];
+    let port = slow_line(&viewer, 1e6, usize::MAX);
+    let url = address(port);
+    let watch = |out: &str, more: &[&str]| {
+        let run = [&scene[..], &pace, &["--steps", "400", "--out", out], more].concat();
+        here.grainscope(&run).exits(0);
+        here.json(&format!("{out}/summary.json"))
+    };
+    let alone = watch("alone", &["--no-recording"]);
+    let kept = watch("kept", &["--connect", &url]);
+    let watched = watch("watched", &["--no-recording", "--connect", &url]);
+    println!("{}\n{}", kept["frames"], watched["frames"]);
+    for summary in [&kept, &watched] {
+        assert_eq!(summary["state_hash"], alone["state_hash"]);
+        assert!(summary["frames"]["sent"].as_u64() > Some(400));
+    }
+    assert_eq!(kept["frames"]["dropped"], 0);
+    assert!(kept["frames"]["waits"].as_u64() > Some(0), "it is slow");
+    recorded_whole(&here, "kept");
+    assert!(watched["frames"]["dropped"].as_u64() > Some(0), "it is slow");
+    assert_eq!(watched["frames"]["waits"], 0, "who only watches keeps nobody waiting");
 }
 
 #[test]
 fn a_port_that_is_taken_is_named() {
     let here = TempFolder::new();
-    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port().to_string();
     let run = arguments("run", &["--serve", "--port", &port]);
     let said = here.grainscope(&run).exits(1);
@@ -224,6 +326,48 @@ fn a_run_is_the_same_however_it_is_watched() {
     assert_eq!(states.len(), 1, "{states:?}");
 }
 
+/// Sums round differently; what is measured does not depend on it.
+#[test]
+fn instruction_sets_agree_on_gauges() {
+    let here = TempFolder::new();
+    let best = here.grainscope(&["doctor", "--json"]).exits(0).json()["vectors"].clone();
+    let sets: Vec<&str> = ["portable", "avx2", "avx512"]
+        .into_iter()
+        .filter(|set| here.grainscope(&["--simd", set, "doctor"]).code == Some(0))
+        .collect();
+    assert!(sets.iter().any(|set| best == *set), "{best} is not among {sets:?}");
+    let mut hashes = Vec::new();
+    let mut gauges: Vec<Vec<Vec<f64>>> = Vec::new();
+    for set in &sets {
+        // One by the option, the other by the environment.
+        here.grainscope(&arguments(set, &["--simd", set])).exits(0);
+        let other = format!("{set}-again");
+        let again = arguments(&other, &["--no-recording"]);
+        let ended = here.command(&again).env("GRAINSCOPE_SIMD", set).output().expect("starts");
+        assert!(ended.status.success());
+        let hash = |run: &str| here.json(&format!("{run}/summary.json"))["state_hash"].clone();
+        assert_eq!(hash(set), hash(&other), "{set}");
+        hashes.push(hash(set));
+        let table = Table::read(&here.read(&format!("{set}/series.csv")));
+        gauges.push(["time", "outflow_rate", "outflow_volume"].map(|c| table.numbers(c)).into());
+    }
+    for (set, columns) in sets.iter().zip(&gauges) {
+        for (one, other) in columns.iter().zip(&gauges[0]) {
+            assert_eq!(one.len(), other.len(), "{set}");
+            let largest = other.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+            let apart = one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            println!("{set}: {:.1e} of {largest:.3e}", apart / largest);
+            assert!(apart <= 1e-9 * largest, "{set}: {apart} of {largest}");
+        }
+    }
+    // They are different programs: otherwise nothing was compared.
+    if sets.len() > 1 {
+        hashes.dedup();
+        assert!(hashes.len() > 1, "the option has no effect");
+    }
+    here.grainscope(&["--simd", "mmx", "doctor"]).exits(2).complains(&["portable"]);
+}
+
 #[test]
 fn a_scene_that_the_machine_has_no_memory_for_is_refused() {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
@@ -254,6 +398,7 @@ fn the_doctor_knows_what_a_bug_report_needs() {
         "system",
         "processor",
         "features",
+        "vectors",
         "threads",
         "memory",
         "disk",

@@ -14,6 +14,8 @@ use grainscope::{plan, sim};
 use rand::Rng;
 use rand::seq::IndexedRandom;
 use rand_pcg::Pcg64Mcg;
+use rerun::external::re_build_info::CrateVersion;
+use rerun::external::re_log_encoding::{DecoderApp, Encoder, EncodingOptions};
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -22,6 +24,8 @@ use std::time::{Duration, Instant};
 
 /// Longest that an input may take.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// Most memory that all these tests together may ever take (kB).
+const MEMORY: u64 = 1_000_000;
 
 /// Hands one input to what is tested; a panic or a delay fails with the input.
 fn try_one(what: &str, number: u64, input: &[u8], test: impl FnOnce()) {
@@ -159,6 +163,11 @@ fn inputs(share: f64, mut each: impl FnMut(&mut Pcg64Mcg, u64)) -> u64 {
     let count = (share * effort("GRAINSCOPE_INPUTS", 20_000) as f64).ceil() as u64;
     let mut random = random();
     (0..count).for_each(|k| each(&mut random, k));
+    if let Ok(status) = std::fs::read_to_string("/proc/self/status") {
+        let line = status.lines().find(|l| l.starts_with("VmHWM:")).expect("a peak");
+        let peak: u64 = line.split_whitespace().nth(1).expect("kB").parse().expect("a number");
+        assert!(peak < MEMORY, "{peak} kB of memory were taken");
+    }
     count
 }
 
@@ -271,16 +280,61 @@ fn checkpoints() {
     assert!(refused > count / 3);
 }
 
+/// A recording with its data as it is.
+fn uncompressed(recording: &[u8]) -> Vec<u8> {
+    let messages = DecoderApp::decode_eager(recording).expect("a recording");
+    let mut plain = Vec::new();
+    let options = EncodingOptions::PROTOBUF_UNCOMPRESSED;
+    let mut encoder =
+        Encoder::new_eager(CrateVersion::LOCAL, options, &mut plain).expect("a beginning");
+    for message in messages {
+        encoder.append(&message.expect("a message")).expect("written");
+    }
+    encoder.finish().expect("an end");
+    drop(encoder);
+    plain
+}
+
+/// Lengths that a forger puts into data, on both sides of its compression.
+#[test]
+fn recordings_that_claim_to_be_large() {
+    let here = TempFolder::new();
+    let run = ["run", "couette_cosserat", "--set", "accuracy.cells=4", "--steps", "1"];
+    here.grainscope(&[&run[..], &["--out", "run"]].concat()).exits(0);
+    let good = std::fs::read(here.path("run/recording.rrd")).expect("a recording");
+    let plain = uncompressed(&good);
+    std::fs::write(here.path("plain.rrd"), &plain).expect("written");
+    here.grainscope(&["repair", "plain.rrd"]).exits(0).prints(&["is whole"]);
+    // A part of an Arrow stream begins with this mark and a length; its body's is inside.
+    let parts: Vec<usize> =
+        (0..plain.len() - 8).filter(|&k| plain[k..k + 4] == [0xff; 4]).collect();
+    assert!(parts.len() > 20);
+    for (k, &part) in parts.iter().enumerate().step_by(parts.len() / 20) {
+        for (name, at, length) in [("part", part + 4, 4), ("inside", part + 24, 8)] {
+            let mut forged = plain.clone();
+            forged[at..at + length].copy_from_slice(&(1_u64 << 30).to_le_bytes()[..length]);
+            let file = format!("{name}{k}.rrd");
+            std::fs::write(here.path(&file), &forged).expect("written");
+            let said = here.grainscope(&["repair", &file]);
+            assert!(said.code.is_some(), "{file} ends the program: {}", said.err);
+            assert!(!said.err.contains("panicked"), "{file}: {}", said.err);
+        }
+    }
+}
+
 #[test]
 fn recordings() {
     let here = TempFolder::new();
     let run = ["run", "couette_cosserat", "--set", "accuracy.cells=4", "--steps", "2"];
     here.grainscope(&[&run[..], &["--out", "run"]].concat()).exits(0);
     let good = std::fs::read(here.path("run/recording.rrd")).expect("a recording");
+    // In one that is not compressed, changes come to what lies inside of its data.
+    let corpus = [uncompressed(&good), good];
     let path = here.path("x.rrd");
     let (mut refused, mut taken) = (0, 0);
     let count = inputs(0.03, |random, k| {
-        let bytes = mutated_bytes(random, &good);
+        let good = corpus.choose(random).expect("two");
+        let bytes = mutated_bytes(random, good);
         std::fs::write(&path, &bytes).expect("written");
         try_one("recording", k, &bytes, || match Recorded::open(&path) {
             Err(e) => {

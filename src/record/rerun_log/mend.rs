@@ -13,7 +13,8 @@ use rerun::external::re_log_types::{StoreKind, TimelineName};
 use rerun::log::LogMsg;
 use rerun::sink::LogSink;
 
-use super::read::{ReadError, below_run, chunk_of, messages};
+use super::decode::{chunk_of, messages};
+use super::read::{ReadError, below_run};
 use super::sinks::{Destinations, RrdFile, Saved, Sink};
 use super::{RecordError, RerunLog, STEP};
 use crate::frame::RunInfo;

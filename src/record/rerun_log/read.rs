@@ -1,18 +1,13 @@
 //! Recordings read back: the scene, the curves and the numbers of the fields of one run.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use rerun::external::re_log_encoding::{
-    DecoderApp, MessageHeader, RRD_FOURCC, StreamFooter, StreamHeader,
-};
-use rerun::external::re_log_types::{ArrowMsg, StoreKind, TimelineName};
+use rerun::external::re_log_types::{StoreKind, TimelineName};
 use rerun::log::{Chunk, LogMsg};
 use rerun::{archetypes, components};
 
+use super::decode::{chunk_of, messages};
 use super::{RUNS, SIM_TIME, WALL_TIME};
 use crate::frame::{GridField, ParticleSnapshot, Rect};
 
@@ -209,137 +204,6 @@ impl Recorded {
         }
         fields
     }
-}
-
-/// The messages of a recording as far as they are sound, and why its end is missing if it is.
-pub(super) fn messages(
-    path: &Path,
-) -> Result<(impl Iterator<Item = Result<LogMsg, String>>, Option<String>), ReadError> {
-    let opened = |source| ReadError::Open { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(opened)?;
-    let closed = is_closed(&mut file).map_err(opened)?;
-    let sound = sound_length(&mut BufReader::new(&file)).map_err(opened)?;
-    file.rewind().map_err(opened)?;
-    let whole = file.metadata().map_err(opened)?.len();
-    let cut = match (closed, sound < whole) {
-        (false, _) => Some("its end is missing".to_owned()),
-        (true, true) => Some(format!("it is damaged after {sound} bytes")),
-        (true, false) => None,
-    };
-    let unreadable = |e: &dyn std::fmt::Display| ReadError::Unreadable {
-        path: path.to_owned(),
-        cause: e.to_string(),
-    };
-    let mut decoder = calmly(|| DecoderApp::decode_eager(BufReader::new(file.take(sound))))
-        .map_err(|e| unreadable(&e))?
-        .map_err(|e| unreadable(&e))?;
-    let messages = std::iter::from_fn(move || match calmly(|| decoder.next()) {
-        Ok(next) => next.map(|message| message.map_err(|e| e.to_string())),
-        Err(cause) => Some(Err(cause)),
-    });
-    Ok((messages, cut))
-}
-
-/// The chunk of a message.
-pub(super) fn chunk_of(message: &ArrowMsg) -> Result<Chunk, String> {
-    calmly(|| Chunk::from_arrow_msg(message).map_err(|e| e.to_string())).flatten()
-}
-
-/// Rerun's decoder trusts what it reads, and may stumble over what is damaged.
-fn calmly<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(decode)).map_err(|_| "its content is damaged".to_owned())
-}
-
-/// Kinds of messages: the end, and data that is compressed.
-const END: u64 = 0;
-const ARROW: u64 = 2;
-const LAST_KIND: u64 = 3;
-/// LZ4 makes its input no larger than this many times.
-const LARGEST_RATIO: u64 = 255;
-const SLACK: u64 = 1 << 16;
-
-/// Bytes of a recording whose frames fit into it. A decoder that was told of a frame of petabytes
-/// would ask for the memory, and end the program.
-fn sound_length(file: &mut (impl Read + Seek)) -> std::io::Result<u64> {
-    let whole = file.seek(SeekFrom::End(0))?;
-    let mut at = StreamHeader::ENCODED_SIZE_BYTES as u64;
-    file.seek(SeekFrom::Start(at))?;
-    let mut payload = Vec::new();
-    loop {
-        const HEADER: u64 = MessageHeader::ENCODED_SIZE_BYTES as u64;
-        if whole.saturating_sub(at) < HEADER {
-            // Without an end the last message may be cut.
-            return Ok(whole);
-        }
-        let mut words = [[0; 8]; 2];
-        file.read_exact(words.as_flattened_mut())?;
-        let [kind, length] = words.map(u64::from_le_bytes);
-        if kind > LAST_KIND || length > whole - at - HEADER {
-            return Ok(at);
-        }
-        if kind == END {
-            // Nothing but an index follows.
-            return Ok(whole.min(at + HEADER + length + SLACK));
-        }
-        payload.resize(length as usize, 0);
-        file.read_exact(&mut payload)?;
-        if kind == ARROW && !is_plausible(&payload) {
-            return Ok(at);
-        }
-        at += HEADER + length;
-    }
-}
-
-/// Whether data is said to become no larger than it can (field 3 of a Protocol Buffers message).
-fn is_plausible(message: &[u8]) -> bool {
-    const SIZE: u64 = 3;
-    let most = LARGEST_RATIO.saturating_mul(message.len() as u64).saturating_add(SLACK);
-    let mut rest = message;
-    while !rest.is_empty() {
-        let Some(key) = varint(&mut rest) else { return false };
-        let skipped = match key & 7 {
-            0 => match varint(&mut rest) {
-                Some(value) if key >> 3 != SIZE || value <= most => continue,
-                _ => return false,
-            },
-            1 => 8,
-            2 => varint(&mut rest).unwrap_or(u64::MAX),
-            5 => 4,
-            _ => return false,
-        };
-        match usize::try_from(skipped).ok().and_then(|n| rest.get(n..)) {
-            Some(after) => rest = after,
-            None => return false,
-        }
-    }
-    true
-}
-
-fn varint(bytes: &mut &[u8]) -> Option<u64> {
-    let mut value = 0;
-    for shift in (0..64).step_by(7) {
-        let (&byte, rest) = bytes.split_first()?;
-        *bytes = rest;
-        value |= u64::from(byte & 0x7f) << shift;
-        if byte < 0x80 {
-            return Some(value);
-        }
-    }
-    None
-}
-
-/// Whether a file has the footer that is written when a recording is closed. The decoder takes an
-/// end without one for an end.
-fn is_closed(file: &mut File) -> std::io::Result<bool> {
-    // It ends with its two names and the number of its entries.
-    const TAIL: i64 = 12;
-    let mut names = [0; 8];
-    if file.metadata()?.len() > TAIL.unsigned_abs() {
-        file.seek(SeekFrom::End(-TAIL))?;
-        file.read_exact(&mut names)?;
-    }
-    file.rewind()?;
-    Ok(names == [RRD_FOURCC, StreamFooter::RRD_IDENTIFIER].concat().as_slice())
 }
 
 /// Seconds on a timeline of the rows that hold a component.

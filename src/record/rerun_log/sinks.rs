@@ -16,6 +16,7 @@ use rerun::external::{re_grpc_server, re_uri};
 use rerun::log::LogMsg;
 use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
 
+use crossbeam::channel::{Sender, bounded};
 use rerun::RecordingStream;
 
 use super::{APPLICATION, FILE_TICK, RecordError};
@@ -175,26 +176,76 @@ impl Live {
     }
 }
 
+/// What is handed to the thread of a viewer.
+enum Parcel {
+    Message(LogMsg),
+    /// Wait until everything before it has left; then say so.
+    Flush(Duration, Sender<Result<(), SinkFlushError>>),
+}
+
+/// Parcels that may wait beside those that Rerun's own queue holds.
+const PARCELS: usize = 8;
+
+/// Rerun's sinks block for as long as a viewer takes nothing, which may be for ever. This one hands
+/// what it is sent to a thread of its own, and gives a viewer up that takes nothing for
+/// [`VIEWER_PATIENCE`]. A viewer that is merely slow slows the logger, whose policy decides what
+/// that means for the run.
 struct LiveSink {
     fault: Fault,
-    inner: Box<dyn LogSink>,
+    line: Sender<Parcel>,
+}
+
+impl LiveSink {
+    /// Starts the thread; it ends when this is dropped and the viewer has taken what waits.
+    fn start(fault: Fault, inner: Box<dyn LogSink>) -> std::io::Result<LiveSink> {
+        let (line, parcels) = bounded(PARCELS);
+        std::thread::Builder::new().name("viewer".into()).spawn(move || {
+            for parcel in parcels {
+                match parcel {
+                    Parcel::Message(message) => inner.send(message),
+                    // Nobody waits any more if this fails.
+                    Parcel::Flush(timeout, done) => {
+                        let _ = done.send(inner.flush_blocking(timeout));
+                    }
+                }
+            }
+        })?;
+        Ok(LiveSink { fault, line })
+    }
+
+    fn hand_over(&self, parcel: Parcel, timeout: Duration) -> Result<(), SinkFlushError> {
+        self.line.send_timeout(parcel, timeout).map_err(|_| {
+            let seconds = timeout.as_secs_f64();
+            SinkFlushError::failed(format!("it took nothing of what was sent for {seconds} s"))
+        })
+    }
+
+    /// The first fault stays.
+    fn note(&self, error: &SinkFlushError) {
+        lock(&self.fault).get_or_insert_with(|| error.to_string());
+    }
 }
 
 impl LogSink for LiveSink {
     fn send(&self, msg: LogMsg) {
-        if lock(&self.fault).is_none() {
-            self.inner.send(msg);
+        if lock(&self.fault).is_none()
+            && let Err(error) = self.hand_over(Parcel::Message(msg), VIEWER_PATIENCE)
+        {
+            self.note(&error);
         }
     }
 
     fn flush_blocking(&self, timeout: Duration) -> Result<(), SinkFlushError> {
-        let mut fault = lock(&self.fault);
-        if let Some(cause) = &*fault {
+        if let Some(cause) = &*lock(&self.fault) {
             return Err(SinkFlushError::failed(cause.clone()));
         }
-        let result = self.inner.flush_blocking(timeout.min(VIEWER_PATIENCE));
+        let timeout = timeout.min(VIEWER_PATIENCE);
+        let (done, flushed) = bounded(1);
+        let result = self
+            .hand_over(Parcel::Flush(timeout, done), timeout)
+            .and_then(|()| flushed.recv_timeout(timeout).unwrap_or(Err(SinkFlushError::Timeout)));
         if let Err(error) = &result {
-            *fault = Some(error.to_string());
+            self.note(error);
         }
         result
     }
@@ -253,10 +304,14 @@ impl Destinations {
         Ok(all)
     }
 
-    fn add_viewer(&mut self, name: String, inner: Box<dyn LogSink>) {
+    fn add_viewer(&mut self, name: String, inner: Box<dyn LogSink>) -> Result<(), RecordError> {
         let fault = Fault::default();
-        self.sinks.push(Box::new(LiveSink { fault: Arc::clone(&fault), inner }));
+        match LiveSink::start(Arc::clone(&fault), inner) {
+            Ok(sink) => self.sinks.push(Box::new(sink)),
+            Err(e) => return Err(RecordError::Viewer { name, cause: e.to_string() }),
+        }
         self.viewers.push(Live { name, fault });
+        Ok(())
     }
 
     fn connect(&mut self, url: &str) -> Result<(), RecordError> {
@@ -264,8 +319,7 @@ impl Destinations {
             name: url.to_owned(),
             cause: format!("{e}; an address looks like {}", rerun::DEFAULT_CONNECT_URL),
         })?;
-        self.add_viewer(url.to_owned(), Box::new(GrpcSink::new(uri)));
-        Ok(())
+        self.add_viewer(url.to_owned(), Box::new(GrpcSink::new(uri)))
     }
 
     fn spawn(&mut self) -> Result<(), RecordError> {
@@ -319,8 +373,7 @@ impl Destinations {
             },
         )
         .map_err(|e| RecordError::Viewer { name: format!("port {port}"), cause: e.to_string() })?;
-        self.add_viewer(name, Box::new(sink));
-        Ok(())
+        self.add_viewer(name, Box::new(sink))
     }
 }
 

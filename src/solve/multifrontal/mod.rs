@@ -180,7 +180,7 @@ impl<const D: usize> Multifrontal<D> {
             vectors: vec![0.0; places.vector[fronts]],
             work: vec![vec![0.0; workspace]; 1 << SHARED_DEPTH],
             stale: vec![true; fronts],
-            simd: Simd::detect(),
+            simd: Simd::used(),
             effort: Effort::default(),
             leaf_of,
             places,
