@@ -9,13 +9,12 @@ use crate::record::checkpoint;
 use crate::record::logger::{Backpressure, Logger, Traffic};
 use crate::record::rerun_log::{RerunLog, Served, Sink};
 use crate::record::run_plots::plots_of_run;
-use crate::record::series::SeriesWriter;
+use crate::record::series::{self, SeriesWriter};
 use crate::record::summary::{Around, Ending, Summary, Tally};
 use crate::record::text::duration;
 use crate::record::{folder, info};
 use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash, to_toml};
 use crate::sim::guard::Guard;
-use crate::sim::row::Row;
 use crate::sim::state::{State, StateError, load_phases, save_phases};
 use crate::sim::{self, Run, SimError, picture};
 use crossbeam::channel::bounded;
@@ -198,7 +197,8 @@ pub(super) struct Session {
     kept: Option<u64>,
     interrupted: Arc<AtomicBool>,
     tally: Tally,
-    rows: Vec<Row>,
+    /// The first state was written down.
+    begun: bool,
     next_frame: usize,
     steps: Option<u64>,
     json: bool,
@@ -255,7 +255,7 @@ impl Session {
             clock,
             before: (0.0, Traffic::default(), 0.0),
             interrupted,
-            rows: Vec::new(),
+            begun: false,
             next_frame: 0,
             steps: args.steps,
             json: args.json,
@@ -279,7 +279,7 @@ impl Session {
         run.restore(state).map_err(unfit)?;
         let row = run.row().clone();
         let past = Past::load(state, &folder).map_err(unfit)?;
-        let (series, rows) = SeriesWriter::resume(&folder.join("series.csv"), plan, &row)
+        let series = SeriesWriter::resume(&folder.join("series.csv"), plan, &row)
             .map_err(|e| Failure::Environment(e.to_string()))?;
         let (logger, warnings) = start_logger(
             args,
@@ -306,7 +306,7 @@ impl Session {
             clock: Instant::now(),
             before: past.before,
             interrupted,
-            rows,
+            begun: true,
             next_frame,
             steps: args.steps,
             json: args.json,
@@ -441,8 +441,9 @@ impl Session {
 
     fn steps(&mut self, mut watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
         self.guard.begin(self.run.as_ref())?;
-        if self.rows.is_empty() {
+        if !self.begun {
             self.observe(vec![])?;
+            self.begun = true;
         }
         watch(self.run.as_ref());
         while !self.run.is_finished() {
@@ -495,7 +496,6 @@ impl Session {
                 return Err(ended_early());
             }
         }
-        self.rows.push(row);
         Ok(())
     }
 
@@ -570,8 +570,16 @@ impl Session {
         let path = self.folder.join("summary.json");
         std::fs::write(&path, format!("{json}\n"))
             .map_err(|e| Failure::Environment(format!("cannot write {}: {e}", path.display())))?;
-        let plotted = plots_of_run(&self.folder, &self.plan, &self.rows).map_err(Failure::from);
+        let plotted = self.plot();
         Ok(Ended { summary, json, recorded, served, failure, plotted })
+    }
+
+    /// Plots the table. Rows are not kept meanwhile: a run of millions of steps takes no more memory
+    /// than a short one.
+    fn plot(&self) -> Result<(), Failure> {
+        let rows = series::rows(&self.folder.join("series.csv"), &self.plan)
+            .map_err(|e| Failure::Environment(e.to_string()))?;
+        Ok(plots_of_run(&self.folder, &self.plan, &rows)?)
     }
 
     /// What a person wants to know at the end.
@@ -723,10 +731,10 @@ impl Past {
             let inside = recording.strip_prefix(folder).map(Path::to_path_buf);
             let path = inside.or_else(|_| std::path::absolute(recording));
             let path = path.unwrap_or_else(|_| recording.clone());
-            state.put_bytes("session.recording", path.to_string_lossy().into_owned());
+            state.put_bytes("session.recording", path.to_string_lossy().bytes());
         }
-        state.put_bytes("session.warnings", self.warnings.join("\n"));
-        state.put_bytes("session.program", env!("CARGO_PKG_VERSION"));
+        state.put_bytes("session.warnings", self.warnings.join("\n").bytes());
+        state.put_bytes("session.program", env!("CARGO_PKG_VERSION").bytes());
     }
 
     fn load(state: &State, folder: &Path) -> Result<Past, StateError> {

@@ -3,101 +3,135 @@
 use super::carrier::{CELL_GRAIN, Carrier};
 use super::gauges::Counter;
 use crate::plan::EffectSet;
-use crate::space::particles::Particles;
+use crate::space::particles::{GONE, Particles};
 use crate::space::population::Count;
 use crate::threads::{self, Divisible};
 
-/// Where a particle comes in a step, and what becomes of what it carries.
-#[derive(Clone, Copy, Default)]
-struct Moved {
+/// Particles that are worth a task of their own.
+const GRAIN: usize = 4096;
+
+/// Where all particles come in a step, and what becomes of what they carry: kept from step to step.
+#[derive(Default)]
+pub struct Journeys {
     /// Not wrapped around periodic sides.
-    to: [f64; 2],
-    left: bool,
-    held: bool,
-    cell: u32,
-    director: [f64; 2],
-    stretch: f64,
+    to: Vec<[f64; 2]>,
+    cell: Vec<u32>,
+    held: Vec<bool>,
+    /// Empty where nothing turns.
+    director: Vec<[f64; 2]>,
+    /// Factors of volume; empty where no volume follows the flow.
+    stretch: Vec<f64>,
 }
 
-/// The particles of some consecutive cells, to be moved.
+impl Journeys {
+    /// Makes room; what was there is void.
+    fn make_room(&mut self, particles: &Particles, effects: &EffectSet) {
+        let n = particles.len();
+        self.to.resize(n, [0.0; 2]);
+        self.cell.resize(n, 0);
+        self.held.resize(n, false);
+        self.director.resize(if particles.director.is_some() { n } else { 0 }, [0.0; 2]);
+        self.stretch.resize(if effects.volume_change { n } else { 0 }, 1.0);
+    }
+}
+
+/// Those of the particles of some consecutive cells.
 struct Members<'a> {
     /// First particle of each of these cells and of the next.
     start: &'a [u32],
-    moved: &'a mut [Moved],
+    to: &'a mut [[f64; 2]],
+    cell: &'a mut [u32],
+    held: &'a mut [bool],
+    director: &'a mut [[f64; 2]],
+    stretch: &'a mut [f64],
 }
 
 impl Divisible for Members<'_> {
     fn cut(self, at: usize) -> (Self, Self) {
+        /// A column may be absent.
+        fn split<T>(column: &mut [T], at: usize) -> (&mut [T], &mut [T]) {
+            let at = at.min(column.len());
+            column.split_at_mut(at)
+        }
         let particles = (self.start[at] - self.start[0]) as usize;
-        let (a, b) = self.moved.split_at_mut(particles);
-        let (before, after) = (&self.start[..=at], &self.start[at..]);
-        (Members { start: before, moved: a }, Members { start: after, moved: b })
+        let (to, cell) = (split(self.to, particles), split(self.cell, particles));
+        let (held, director) = (split(self.held, particles), split(self.director, particles));
+        let stretch = split(self.stretch, particles);
+        let part = |start, to, cell, held, director, stretch| Members {
+            start,
+            to,
+            cell,
+            held,
+            director,
+            stretch,
+        };
+        (
+            part(&self.start[..=at], to.0, cell.0, held.0, director.0, stretch.0),
+            part(&self.start[at..], to.1, cell.1, held.1, director.1, stretch.1),
+        )
     }
 }
 
 /// Moves all particles through a step. `particles` must be sorted, and are sorted afterwards.
-/// `compliant[m]`: volumes of material `m` follow the flow, and its particles keep their mass.
+/// `compliant`: volumes of such a material follow the flow, and its particles keep their mass.
 pub fn advance(
     carrier: &Carrier,
     particles: &mut Particles,
+    journeys: &mut Journeys,
     effects: &EffectSet,
-    compliant: &[bool],
+    compliant: impl Fn(u8) -> bool + Sync,
     gauges: &mut [Counter],
     count: &mut Count,
 ) {
     let mesh = carrier.mesh;
-    let turning = effects.directors || effects.volume_change;
-    let mut moved = vec![Moved::default(); particles.len()];
-    let members = Members { start: &particles.cell_start, moved: &mut moved };
+    journeys.make_room(particles, effects);
+    let Journeys { to, cell, held, director, stretch } = &mut *journeys;
+    let members = Members { start: &particles.cell_start, to, cell, held, director, stretch };
     threads::for_parts(members, 0..mesh.cells(), CELL_GRAIN, |cells, members| {
         let first = members.start[0] as usize;
-        for cell in cells {
-            let range = particles.of_cell(cell);
-            carrier.travel_all(cell, &particles.position[range.clone()], |k, journey| {
+        for home in cells {
+            let range = particles.of_cell(home);
+            carrier.travel_all(home, &particles.position[range.clone()], |k, journey| {
                 let p = range.start + k;
-                let moved = &mut members.moved[p - first];
-                (moved.left, moved.held) = (journey.left, journey.held);
-                moved.to = journey.to;
+                let at = p - first;
+                members.held[at] = journey.held;
+                members.to[at] = journey.to;
                 let arrived = || mesh.locate(mesh.wrap(journey.to));
-                moved.cell = journey.stays.unwrap_or_else(arrived) as u32;
-                if turning {
-                    let l = carrier.gradient(journey.middle);
-                    if let Some(director) = &particles.director {
-                        moved.director = carrier.turn(director[p], &l);
-                    }
-                    if compliant[particles.material[p] as usize] {
-                        moved.stretch = (l.trace() * carrier.dt).exp();
-                    }
+                let cell = journey.cell.unwrap_or_else(arrived) as u32;
+                members.cell[at] = if journey.left { GONE } else { cell };
+                if members.director.is_empty() && members.stretch.is_empty() {
+                    return;
+                }
+                let l = carrier.gradient(journey.middle);
+                if let Some(director) = &particles.director {
+                    members.director[at] = carrier.turn(director[p], &l);
+                }
+                if let Some(stretch) = members.stretch.get_mut(at) {
+                    let follows = compliant(particles.material[p]);
+                    *stretch = if follows { (l.trace() * carrier.dt).exp() } else { 1.0 };
                 }
             });
         }
     });
     for gauge in gauges {
-        for (p, moved) in moved.iter().enumerate() {
-            let (material, volume) = (particles.material[p], particles.volume[p]);
-            gauge.pass(mesh, particles.position[p], moved.to, material, volume);
+        for (p, &to) in to.iter().enumerate() {
+            gauge.pass(mesh, particles.position[p], to, particles.material[p], particles.volume[p]);
         }
     }
-    for (p, moved) in moved.iter().enumerate() {
-        count.held += u64::from(moved.held);
-        if !moved.left {
-            particles.position[p] = mesh.wrap(moved.to);
-        }
-        if let (true, Some(director)) = (turning, &mut particles.director) {
-            director[p] = moved.director;
-        }
-        if turning && compliant[particles.material[p] as usize] {
-            particles.volume[p] *= moved.stretch;
-            if let Some(density) = &mut particles.density {
-                density[p] /= moved.stretch;
-            }
+    count.held += held.iter().filter(|&&held| held).count() as u64;
+    count.left += cell.iter().filter(|&&cell| cell == GONE).count() as u64;
+    if mesh.x.periodic() || mesh.y.periodic() {
+        threads::for_each(to, GRAIN, |_, p| *p = mesh.wrap(*p));
+    }
+    std::mem::swap(&mut particles.position, to);
+    if let Some(column) = &mut particles.director {
+        std::mem::swap(column, director);
+    }
+    for (p, stretch) in stretch.iter().enumerate() {
+        particles.volume[p] *= stretch;
+        if let Some(density) = &mut particles.density {
+            density[p] /= stretch;
         }
     }
-    let stay = || moved.iter().filter(|m| !m.left);
-    if moved.iter().any(|m| m.left) {
-        let gone: Vec<bool> = moved.iter().map(|m| m.left).collect();
-        count.left += gone.iter().filter(|&&g| g).count() as u64;
-        particles.remove(&gone);
-    }
-    particles.sort_into(mesh.cells(), stay().map(|m| m.cell));
+    particles.regroup(cell);
 }

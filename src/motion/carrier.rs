@@ -3,7 +3,7 @@
 use super::current::{Current, Points, TOGETHER, ways};
 use crate::laws::director;
 use crate::simd::Simd;
-use crate::space::mesh::{INSIDE, Mesh};
+use crate::space::mesh::{Axis, INSIDE, Mesh, Span};
 use crate::space::walls::{Enclosure, Landing};
 use crate::threads;
 use nalgebra::Matrix2;
@@ -11,13 +11,44 @@ use nalgebra::Matrix2;
 /// Cells that are worth a task of their own.
 pub const CELL_GRAIN: usize = 64;
 
+/// What carries points, cell by cell: kept from step to step.
+pub struct Currents {
+    cells: Vec<Current>,
+    /// Between a point of the cell and one of the up to nine around it there is never a wall, a side
+    /// of the domain or a seam.
+    free: Vec<bool>,
+}
+
+impl Currents {
+    pub fn new(mesh: &Mesh, enclosure: &Enclosure) -> Self {
+        let free = (0..mesh.cells()).map(|cell| is_free(mesh, enclosure, cell)).collect();
+        Currents { cells: vec![Current::default(); mesh.cells()], free }
+    }
+}
+
+fn is_free(mesh: &Mesh, enclosure: &Enclosure, cell: usize) -> bool {
+    let (i, j) = mesh.cell_ij(cell);
+    let amid = |k: usize, axis: &Axis| k > 0 && k + 1 < axis.cells();
+    if !amid(i, &mesh.x) || !amid(j, &mesh.y) || mesh.block(cell).any(|c| mesh.solid[c]) {
+        return false;
+    }
+    let extent = |k: usize, axis: &Axis| [axis.lines()[k - 1], axis.lines()[k + 2]];
+    let block = [extent(i, &mesh.x), extent(j, &mesh.y)];
+    let meets = |[low, high]: [f64; 2], from: f64, to: f64| from <= high && to >= low;
+    !enclosure
+        .obstacles
+        .iter()
+        .any(|w| meets(block[w.normal], w.at, w.at) && meets(block[1 - w.normal], w.from, w.to))
+}
+
 /// A velocity field frozen at the middle of a step, and the walls in it.
 pub struct Carrier<'a> {
     pub mesh: &'a Mesh,
     pub enclosure: &'a Enclosure,
     pub dt: f64,
     /// Of every cell, at the middle of the step.
-    currents: Vec<Current>,
+    currents: &'a [Current],
+    free: &'a [bool],
     simd: Simd,
 }
 
@@ -31,38 +62,75 @@ pub struct Journey {
     pub held: bool,
     /// Cell and reference coordinates of its middle.
     pub middle: (usize, [f64; 2]),
-    /// The cell, where it is known to be that of the start.
-    pub stays: Option<usize>,
+    /// The cell that it comes to, where that is known.
+    pub cell: Option<usize>,
 }
 
 /// The cell that points start from.
 pub struct Home {
     cell: usize,
-    centre: [f64; 2],
-    /// Reference coordinates per length.
-    per_length: [f64; 2],
+    /// That cell, and those on either side of it, by direction; these only where it is free.
+    spans: [[Span; 3]; 2],
+    /// From a cell to the next, by direction.
+    stride: [usize; 2],
+    free: bool,
 }
 
 impl Home {
-    pub fn new(mesh: &Mesh, cell: usize) -> Self {
-        let per_length = mesh.cell_size(cell).map(|h| 2.0 / h);
-        Home { cell, centre: mesh.cell_centre(cell), per_length }
+    fn reference(&self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|c| self.spans[c][1].reference(p[c]))
     }
 
-    fn reference(&self, p: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|c| (p[c] - self.centre[c]) * self.per_length[c])
+    /// The cell, of this one and of those around it, that certainly holds a place, and where in it
+    /// that is.
+    fn near(&self, p: [f64; 2]) -> Option<(usize, [f64; 2])> {
+        let (mut cell, mut r) = (self.cell, self.reference(p));
+        for c in 0..2 {
+            if r[c].abs() < INSIDE {
+                continue;
+            }
+            let side = if r[c] > 0.0 { 2 } else { 0 };
+            r[c] = self.spans[c][side].reference(p[c]);
+            if !(self.free && r[c].abs() < INSIDE) {
+                return None;
+            }
+            cell = cell + side / 2 * 2 * self.stride[c] - self.stride[c];
+        }
+        Some((cell, r))
     }
 }
 
 impl<'a> Carrier<'a> {
     /// `velocity`: at the nodes, of the middle of the step.
-    pub fn new(mesh: &'a Mesh, enclosure: &'a Enclosure, velocity: &[[f64; 2]], dt: f64) -> Self {
-        let mut currents = vec![Current::default(); mesh.cells()];
-        threads::for_each(&mut currents, CELL_GRAIN, |cell, current| {
+    pub fn new(
+        mesh: &'a Mesh,
+        enclosure: &'a Enclosure,
+        currents: &'a mut Currents,
+        velocity: &[[f64; 2]],
+        dt: f64,
+    ) -> Self {
+        threads::for_each(&mut currents.cells, CELL_GRAIN, |cell, current| {
             let nodal = mesh.cell_nodes(cell).map(|n| velocity[n]);
             *current = Current::new(&nodal, mesh.cell_size(cell));
         });
-        Carrier { mesh, enclosure, dt, currents, simd: Simd::used() }
+        let Currents { cells, free } = currents;
+        Carrier { mesh, enclosure, dt, currents: cells, free, simd: Simd::used() }
+    }
+
+    /// A cell to start from.
+    pub fn home(&self, cell: usize) -> Home {
+        let (i, j) = self.mesh.cell_ij(cell);
+        let free = self.free[cell];
+        let spans = |axis: &Axis, k: usize| {
+            let near = |k: usize| if free { axis.span(k) } else { Span::default() };
+            [near(k.wrapping_sub(1)), axis.span(k), near(k + 1)]
+        };
+        Home {
+            cell,
+            spans: [spans(&self.mesh.x, i), spans(&self.mesh.y, j)],
+            stride: [1, self.mesh.x.cells()],
+            free,
+        }
     }
 
     /// Velocity at a place reached from `p`, walls and periodic sides respected, and where it
@@ -76,16 +144,14 @@ impl<'a> Carrier<'a> {
     ) -> ([f64; 2], (usize, [f64; 2])) {
         let mesh = self.mesh;
         let goal = [p[0] + dt * u[0], p[1] + dt * u[1]];
-        let r = home.reference(goal);
-        if r[0].abs() < INSIDE && r[1].abs() < INSIDE {
-            return (self.currents[home.cell].at(r), (home.cell, r));
-        }
-        let place = match self.enclosure.follow(mesh, p, goal) {
-            Landing::Free(q) | Landing::Held(q) => mesh.wrap(q),
-            Landing::Left => p,
-        };
-        let cell = mesh.locate(place);
-        let r = mesh.to_reference(cell, place);
+        let (cell, r) = home.near(goal).unwrap_or_else(|| {
+            let place = match self.enclosure.follow(mesh, p, goal) {
+                Landing::Free(q) | Landing::Held(q) => mesh.wrap(q),
+                Landing::Left => p,
+            };
+            let cell = mesh.locate(place);
+            (cell, mesh.to_reference(cell, place))
+        });
         (self.currents[cell].at(r), (cell, r))
     }
 
@@ -101,17 +167,15 @@ impl<'a> Carrier<'a> {
         let (k4, _) = self.stage(home, p, k3, dt);
         let mean = |c: usize| (k1[c] + 2.0 * (k2[c] + k3[c]) + k4[c]) / 6.0;
         let goal = [p[0] + dt * mean(0), p[1] + dt * mean(1)];
-        let r = home.reference(goal);
-        if r[0].abs() < INSIDE && r[1].abs() < INSIDE {
-            let stays = Some(home.cell);
-            return Journey { to: goal, left: false, held: false, middle, stays };
+        if let Some((cell, _)) = home.near(goal) {
+            return Journey { to: goal, left: false, held: false, middle, cell: Some(cell) };
         }
         let (to, left, held) = match self.enclosure.follow(self.mesh, p, goal) {
             Landing::Free(q) => (q, false, false),
             Landing::Held(q) => (q, false, true),
             Landing::Left => (goal, true, false),
         };
-        Journey { to, left, held, middle, stays: None }
+        Journey { to, left, held, middle, cell: None }
     }
 
     /// The ways of the points of one cell: those that stay inside it together, the others one by one.
@@ -121,19 +185,22 @@ impl<'a> Carrier<'a> {
         from: &[[f64; 2]],
         mut arrive: impl FnMut(usize, Journey),
     ) {
-        let (home, dt) = (Home::new(self.mesh, cell), self.dt);
+        if from.is_empty() {
+            return;
+        }
+        let (home, dt) = (self.home(cell), self.dt);
         for (at, points) in from.chunks(TOGETHER).enumerate() {
             let mut r: Points = [[0.0; TOGETHER]; 2];
             for (k, p) in points.iter().enumerate() {
                 [r[0][k], r[1][k]] = home.reference(*p);
             }
-            let step = home.per_length.map(|s| dt * s);
+            let step = home.spans.map(|[_, own, _]| dt * own.per_length);
             let ways = ways(self.simd, &self.currents[cell], &r, step);
             for (k, &p) in points.iter().enumerate() {
                 let journey = if ways.inside[k] {
                     let to = [0, 1].map(|c| p[c] + dt * ways.velocity[c][k]);
                     let middle = (cell, [ways.middle[0][k], ways.middle[1][k]]);
-                    Journey { to, left: false, held: false, middle, stays: Some(cell) }
+                    Journey { to, left: false, held: false, middle, cell: Some(cell) }
                 } else {
                     self.travel(&home, p)
                 };

@@ -1,6 +1,6 @@
 //! Dye: passive polylines, refined as they stretch so that they stay smooth.
 
-use super::carrier::{Carrier, Home};
+use super::carrier::Carrier;
 use crate::plan::Tracers;
 use crate::space::mesh::Mesh;
 
@@ -12,11 +12,13 @@ const MAX_POINTS: usize = 200_000;
 pub struct DyeLines {
     pub lines: Vec<Vec<[f64; 2]>>,
     spacing: f64,
+    /// Where a line is written anew.
+    room: Vec<[f64; 2]>,
 }
 
 impl DyeLines {
     pub fn new(plan: &Tracers) -> Self {
-        DyeLines { lines: plan.lines.clone(), spacing: plan.spacing }
+        DyeLines { lines: plan.lines.clone(), spacing: plan.spacing, room: Vec::new() }
     }
 
     pub fn points(&self) -> usize {
@@ -34,14 +36,16 @@ impl DyeLines {
             line.retain_mut(|p| {
                 let inside = mesh.wrap(*p);
                 let offset = [p[0] - inside[0], p[1] - inside[1]];
-                let journey = carrier.travel(&Home::new(mesh, mesh.locate(inside)), inside);
+                let journey = carrier.travel(&carrier.home(mesh.locate(inside)), inside);
                 *p = [journey.to[0] + offset[0], journey.to[1] + offset[1]];
                 !journey.left
             });
         }
-        let mut room = MAX_POINTS.saturating_sub(self.points());
+        let mut more = MAX_POINTS.saturating_sub(self.points());
         for line in &mut self.lines {
-            *line = respaced(line, self.spacing, &mut room);
+            respace(line, &mut self.room, self.spacing, &mut more);
+            // The room of the line, which it may need again, stays its own.
+            line.clone_from(&self.room);
         }
     }
 
@@ -73,10 +77,10 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// The line with points inserted where they are farther apart than `spacing`, and left out where
-/// they crowd.
-fn respaced(line: &[[f64; 2]], spacing: f64, room: &mut usize) -> Vec<[f64; 2]> {
-    let mut out: Vec<[f64; 2]> = Vec::with_capacity(line.len());
+/// Writes the line with points inserted where they are farther apart than `spacing`, `more` at most,
+/// and left out where they crowd.
+fn respace(line: &[[f64; 2]], out: &mut Vec<[f64; 2]>, spacing: f64, more: &mut usize) {
+    out.clear();
     for (k, &p) in line.iter().enumerate() {
         let inner = k > 0 && k + 1 < line.len();
         if inner && out.last().is_some_and(|&q| distance(q, line[k + 1]) < 0.4 * spacing) {
@@ -84,16 +88,15 @@ fn respaced(line: &[[f64; 2]], spacing: f64, room: &mut usize) -> Vec<[f64; 2]> 
         }
         if let Some(&q) = out.last()
             && distance(p, q) > spacing
-            && *room > 0
+            && *more > 0
         {
             let before = if out.len() > 1 { out[out.len() - 2] } else { q };
             let after = if k + 1 < line.len() { line[k + 1] } else { p };
             out.push(between(before, q, p, after));
-            *room -= 1;
+            *more -= 1;
         }
         out.push(p);
     }
-    out
 }
 
 /// Point halfway from `b` to `c` on the cubic through four points; on the chord where the cubic

@@ -71,17 +71,15 @@ impl SeriesWriter {
         Ok(series)
     }
 
-    /// Goes on with a table after a row: what it holds of later steps is dropped, what it holds of
-    /// earlier ones is given. The row itself may be missing: it is known.
-    pub fn resume(path: &Path, plan: &Plan, row: &Row) -> Result<(Self, Vec<Row>), ResumeError> {
+    /// Goes on with a table after a row: what it holds of later steps is dropped. The row itself may
+    /// be missing: it is known.
+    pub fn resume(path: &Path, plan: &Plan, row: &Row) -> Result<Self, TableError> {
         let step = row.step;
-        let fault = |source| ResumeError::File { path: path.to_path_buf(), source };
-        let text = std::fs::read_to_string(path).map_err(fault)?;
-        let (mut rows, length) = whole_rows(&text, plan, step)
-            .map_err(|(line, what)| ResumeError::Row { path: path.to_path_buf(), line, what })?;
+        let fault = |source| TableError::File { path: path.to_path_buf(), source };
+        let (rows, length) = read(path, plan, step)?;
         if (rows.len() as u64) < step {
             let path = path.to_path_buf();
-            return Err(ResumeError::Short { path, rows: rows.len(), step });
+            return Err(TableError::Short { path, rows: rows.len(), step });
         }
         let mut out = File::options().write(true).open(path).map_err(fault)?;
         out.set_len(length).map_err(fault)?;
@@ -89,9 +87,8 @@ impl SeriesWriter {
         let mut series = SeriesWriter { out, length, alignment: plan.effects.directors };
         if rows.len() as u64 == step {
             series.write(row).map_err(fault)?;
-            rows.push(row.clone());
         }
-        Ok((series, rows))
+        Ok(series)
     }
 
     /// Adds a line, all of it or nothing.
@@ -154,9 +151,25 @@ impl SeriesWriter {
     }
 }
 
-/// Why a table cannot be taken up again.
+/// The rows of a run's table.
+pub fn rows(path: &Path, plan: &Plan) -> Result<Vec<Row>, TableError> {
+    read(path, plan, u64::MAX).map(|read| read.0)
+}
+
+/// Rows of a table up to a step, and the bytes that they take.
+fn read(path: &Path, plan: &Plan, until: u64) -> Result<(Vec<Row>, u64), TableError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| TableError::File { path: path.to_path_buf(), source })?;
+    whole_rows(&text, plan, until).map_err(|(line, what)| TableError::Row {
+        path: path.to_path_buf(),
+        line,
+        what,
+    })
+}
+
+/// Why a table cannot be read or taken up again.
 #[derive(Debug, thiserror::Error)]
-pub enum ResumeError {
+pub enum TableError {
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
     #[error("{}: line {line}: {what}", path.display())]

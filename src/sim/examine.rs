@@ -120,9 +120,15 @@ fn excess(value: f64) -> &'static str {
 }
 
 /// The first number that is not finite, or whose square is not, and its index.
-fn first_bad<'a>(values: impl IntoIterator<Item = &'a f64>) -> Option<(usize, f64)> {
+fn first_bad(values: &[f64]) -> Option<(usize, f64)> {
+    /// Numbers that are looked at together.
+    const TOGETHER: usize = 256;
     let good = |v: f64| v.abs() < LARGEST;
-    values.into_iter().copied().enumerate().find(|&(_, v)| !good(v))
+    let all_good = |part: &[f64]| part.iter().fold(true, |all, &v| all & good(v));
+    let part = values.chunks(TOGETHER).position(|part| !all_good(part))?;
+    let first = part * TOGETHER;
+    let bad = values[first..].iter().position(|&v| !good(v))?;
+    Some((first + bad, values[first + bad]))
 }
 
 fn inside(mesh: &Mesh, p: [f64; 2]) -> bool {
@@ -224,11 +230,9 @@ impl<const D: usize> Simulation<D> {
         }
         let mesh = &self.plan.mesh;
         let cell = mesh.x.length() * mesh.y.length() / mesh.cells() as f64;
-        let volumes = self.particles.volumes(self.matter.materials.len());
-        for ((&drift, volume), material) in r.drift.iter().zip(volumes).zip(&self.matter.materials)
-        {
+        for (m, (&drift, material)) in r.drift.iter().zip(&self.matter.materials).enumerate() {
             let strays = drift.is_nan() || drift.abs() > DRIFT;
-            if volume > CELLS_THAT_DRIFT * cell && strays {
+            if strays && self.particles.volume_of(m) > CELLS_THAT_DRIFT * cell {
                 let material = material.name.clone();
                 return Err(Fault::Drift { material, drift: drift.abs(), limit: DRIFT });
             }

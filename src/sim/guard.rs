@@ -82,7 +82,7 @@ impl Guard {
         };
         run.limit_step(None);
         outcome?;
-        self.good = run.state();
+        run.save(&mut self.good);
         Ok(notes)
     }
 }
@@ -243,8 +243,8 @@ mod tests {
         fn replan(&mut self, plan: Arc<Plan>) {
             self.run.replan(plan);
         }
-        fn state(&self) -> State {
-            self.run.state()
+        fn save(&self, state: &mut State) {
+            self.run.save(state)
         }
         fn restore(&mut self, state: &State) -> Result<(), StateError> {
             self.run.restore(state)

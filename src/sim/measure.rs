@@ -6,8 +6,10 @@ use super::row::{GaugeRow, Phases, Row};
 use crate::plan::Plan;
 use crate::plan::material::Material;
 use crate::solve::element::{PointShape, Rates};
+use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
+use crate::threads;
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
@@ -50,6 +52,23 @@ pub fn empty_row(plan: &Plan) -> Row {
     }
 }
 
+/// What a unit velocity of each node crosses per unit time, in the smallest of its cells as they
+/// count; nothing where all are solid.
+pub fn crossing_rates(mesh: &Mesh) -> Vec<[f64; 2]> {
+    let usual =
+        [&mesh.x, &mesh.y].map(|axis| (0..axis.cells()).map(|k| axis.size(k)).fold(0.0, f64::max));
+    let mut rates = vec![[0.0_f64; 2]; mesh.nodes()];
+    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let counted = mesh.cell_size(cell).map(|h| h * GRADED_ALLOWANCE);
+        for node in mesh.cell_nodes(cell) {
+            for c in 0..2 {
+                rates[node][c] = rates[node][c].max(1.0 / counted[c].min(usual[c]));
+            }
+        }
+    }
+    rates
+}
+
 /// SHA-256 over the bits of everything particles carry.
 pub fn hash(p: &Particles) -> String {
     let mut h = Sha256::new();
@@ -85,8 +104,8 @@ impl<const D: usize> Simulation<D> {
     pub(super) fn speeds(&self) -> Speeds {
         let mesh = &self.plan.mesh;
         let centre = Shape::at([0.0; 2]);
-        let layered: Vec<bool> =
-            self.matter.materials.iter().map(|m| m.layer_viscosity.is_some()).collect();
+        let materials = &self.matter.materials;
+        let layered = |m: usize| materials[m].layer_viscosity.is_some();
         let velocity = &self.flow.velocity;
         let crossings = self.crossings(|node| [velocity[node][0], velocity[node][1]]);
         let mut speeds = Speeds { crossings, strain_rate: 0.0, relaxation: self.matter.relaxation };
@@ -94,7 +113,7 @@ impl<const D: usize> Simulation<D> {
             return speeds;
         }
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            if (0..layered.len()).any(|m| layered[m] && self.quadrature.fraction(cell, m) > 0.0) {
+            if (0..materials.len()).any(|m| layered(m) && self.quadrature.fraction(cell, m) > 0.0) {
                 let [hx, hy] = mesh.cell_size(cell);
                 let nodal = self.flow.of_cell(mesh, cell);
                 let rates = Rates::new(&PointShape::new(&centre, [hx, hy]), &nodal);
@@ -108,30 +127,18 @@ impl<const D: usize> Simulation<D> {
 
     /// Largest number of cells crossed per unit time with these velocities of the nodes.
     pub(super) fn crossings(&self, velocity: impl Fn(usize) -> [f64; 2]) -> f64 {
-        let mesh = &self.plan.mesh;
-        let usual = [&mesh.x, &mesh.y]
-            .map(|axis| (0..axis.cells()).map(|k| axis.size(k)).fold(0.0, f64::max));
-        let mut most: f64 = 0.0;
-        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            let counted = mesh.cell_size(cell).map(|h| h * GRADED_ALLOWANCE);
-            for node in mesh.cell_nodes(cell) {
-                let u = velocity(node);
-                for c in 0..2 {
-                    most = most.max(u[c].abs() / counted[c].min(usual[c]));
-                }
-            }
-        }
-        most
+        let crossed = |(node, rate): (usize, &[f64; 2])| {
+            let u = velocity(node);
+            (u[0].abs() * rate[0]).max(u[1].abs() * rate[1])
+        };
+        self.crossing_rates.iter().enumerate().map(crossed).fold(0.0, f64::max)
     }
 
-    /// Projected area of each material over the volume of its particles.
-    pub(super) fn projected_shares(&self) -> Vec<f64> {
-        let volumes = self.particles.volumes(self.matter.materials.len());
-        let share = |(m, &volume): (usize, &f64)| {
-            let area = self.quadrature.projected_area(&self.plan.mesh, m);
-            if volume > 0.0 { area / volume } else { 0.0 }
-        };
-        volumes.iter().enumerate().map(share).collect()
+    /// Projected area of a material over the volume of its particles.
+    pub(super) fn projected_share(&self, material: usize) -> f64 {
+        let volume = self.particles.volume_of(material);
+        let area = self.quadrature.projected_area(&self.plan.mesh, material);
+        if volume > 0.0 { area / volume } else { 0.0 }
     }
 
     /// Of the particles in gravity, less what the background would have in their place.
@@ -140,17 +147,16 @@ impl<const D: usize> Simulation<D> {
         let ground =
             self.plan.background().map_or(0.0, |b| self.matter.materials[b as usize].density);
         let g = self.matter.gravity;
-        (0..p.len())
-            .map(|k| {
-                let m = &self.matter.materials[p.material[k] as usize];
-                let density = match &p.density {
-                    Some(d) if m.carries_density => d[k],
-                    _ => m.density,
-                };
-                let x = p.position[k];
-                -p.volume[k] * (density - ground) * (g[0] * x[0] + g[1] * x[1])
-            })
-            .sum()
+        let [energy] = threads::sum(0..p.len(), |k| {
+            let m = &self.matter.materials[p.material[k] as usize];
+            let density = match &p.density {
+                Some(d) if m.carries_density => d[k],
+                _ => m.density,
+            };
+            let x = p.position[k];
+            [-p.volume[k] * (density - ground) * (g[0] * x[0] + g[1] * x[1])]
+        });
+        energy
     }
 
     /// Power of everything but gravity.
@@ -170,16 +176,15 @@ impl<const D: usize> Simulation<D> {
 
     fn volume_error(&self) -> f64 {
         let mesh = &self.plan.mesh;
-        let (mut sum, mut cells) = (0.0, 0);
-        for cell in 0..mesh.cells() {
+        let [sum, cells] = threads::sum(0..mesh.cells(), |cell| {
             let range = self.particles.of_cell(cell);
-            if !range.is_empty() {
-                let volume: f64 = self.particles.volume[range].iter().sum();
-                sum += (volume / mesh.cell_area(cell) - 1.0).powi(2);
-                cells += 1;
+            if range.is_empty() {
+                return [0.0; 2];
             }
-        }
-        (sum / f64::from(cells.max(1))).sqrt()
+            let volume: f64 = self.particles.volume[range].iter().sum();
+            [(volume / mesh.cell_area(cell) - 1.0).powi(2), 1.0]
+        });
+        (sum / cells.max(1.0)).sqrt()
     }
 
     /// Writes the row of the current state, reached by a step of `dt` that began at `clock`.
@@ -206,21 +211,19 @@ impl<const D: usize> Simulation<D> {
         };
         let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
         let work = trapezoid(before.work, self.last_other_power, other);
-        let drift = self
-            .projected_shares()
-            .iter()
-            .zip(&self.baseline)
-            .map(|(now, start)| if *start > 0.0 { now / start - 1.0 } else { 0.0 })
-            .collect();
-        let gauges = self
-            .gauges
-            .iter()
-            .map(|g| GaugeRow {
-                volume: g.volume * u.area(),
-                rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
-                    * u.area_rate(),
-            })
-            .collect();
+        // In the room of the row before.
+        let mut drift = std::mem::take(&mut self.row.drift);
+        drift.clear();
+        drift.extend(self.baseline.iter().enumerate().map(|(m, &start)| {
+            if start > 0.0 { self.projected_share(m) / start - 1.0 } else { 0.0 }
+        }));
+        let mut gauges = std::mem::take(&mut self.row.gauges);
+        gauges.clear();
+        gauges.extend(self.gauges.iter().map(|g| GaugeRow {
+            volume: g.volume * u.area(),
+            rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
+                * u.area_rate(),
+        }));
         let director_error = self
             .particles
             .director

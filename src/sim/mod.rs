@@ -21,8 +21,8 @@ pub mod row;
 mod sampling;
 pub mod state;
 
-use crate::motion::advect;
-use crate::motion::carrier::Carrier;
+use crate::motion::advect::{self, Journeys};
+use crate::motion::carrier::{Carrier, Currents};
 use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
 use crate::plan::boundary::add_body_force;
@@ -129,9 +129,17 @@ pub struct Simulation<const D: usize> {
     /// Those that restoring terms may lie on; none where no scene calls for them.
     restoring_faces: Vec<Face>,
     particles: Particles,
+    currents: Currents,
+    /// Cells that a unit velocity of each node may cross per unit time.
+    crossing_rates: Vec<[f64; 2]>,
+    journeys: Journeys,
     flow: Flow<D>,
     /// The solution before; none at the start and after a sudden change.
     previous: Option<Before<D>>,
+    /// Room for the solution before the next one.
+    spare: Flow<D>,
+    /// Velocities in the middle of a step, for points to move with.
+    half: Vec<[f64; 2]>,
     /// Nodal forces that do not change: tractions and fixed body forces.
     fixed_load: Vec<[f64; D]>,
     load: Vec<[f64; D]>,
@@ -191,8 +199,14 @@ pub trait Run: Send {
     fn changes_applied(&self) -> usize;
     /// Goes on with another plan, made by [`Plan::with_change`]: the two share all that lies behind.
     fn replan(&mut self, plan: Arc<Plan>);
-    /// Everything that the next step depends on.
-    fn state(&self) -> State;
+    /// Writes everything that the next step depends on, over what a run of the same plan wrote before.
+    fn save(&self, state: &mut State);
+    /// The same, on its own.
+    fn state(&self) -> State {
+        let mut state = State::default();
+        self.save(&mut state);
+        state
+    }
     /// Goes on from a state of a run of the same plan, to the last bit as that one would.
     fn restore(&mut self, state: &State) -> Result<(), StateError>;
     /// Steps may be no longer than this (s) until told otherwise.
@@ -259,8 +273,13 @@ impl<const D: usize> Simulation<D> {
                 Neighbours::new(&mesh, &plan.enclosure),
                 plan.state.materials.len(),
             ),
+            currents: Currents::new(&mesh, &plan.enclosure),
+            crossing_rates: measure::crossing_rates(&mesh),
+            journeys: Journeys::default(),
             flow: Flow::zero(&mesh),
             previous: None,
+            spare: Flow::zero(&mesh),
+            half: Vec::new(),
             load: fixed_load.clone(),
             other_load: fixed_load.clone(),
             fixed_load,
@@ -288,7 +307,7 @@ impl<const D: usize> Simulation<D> {
         sim.apply_changes();
         let mut seconds = Phases::default();
         sim.solve(None, &mut seconds)?;
-        sim.baseline = sim.projected_shares();
+        sim.baseline = (0..sim.matter.materials.len()).map(|m| sim.projected_share(m)).collect();
         sim.measure(0.0, Limiter::Start, seconds, sim.report.corrections, clock);
         Ok(sim)
     }
@@ -313,34 +332,36 @@ impl<const D: usize> Simulation<D> {
             (dt, limiter) = (longest, Limiter::Guard);
         }
         let mut extra = 0;
-        let half = loop {
+        loop {
             self.attempted = dt;
             if dt.is_nan() || self.time + dt <= self.time {
                 let dt = dt * self.plan.units.time;
                 return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
             }
-            let (half, corrections) = self.half_step_velocity(dt, &mut seconds)?;
-            extra += corrections;
+            extra += self.find_half_step_velocity(dt, &mut seconds)?;
             // A flow that has hardly begun says nothing about its own middle of the step.
-            let crossed = dt * self.crossings(|node| half[node]);
+            let crossed = dt * self.crossings(|node| self.half[node]);
             let most = self.plan.clock.courant;
             if crossed <= SURPRISE * most {
-                break half;
+                break;
             }
             (dt, limiter) = (dt * (most / crossed), Limiter::Courant);
-        };
+        }
 
         let phase = Instant::now();
         let plan = self.plan.clone();
-        let compliant = self.compliant();
-        let parts = self.parts(&half, dt);
-        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, &half, dt / f64::from(parts));
+        let parts = self.parts(dt);
+        let Simulation { currents, half, matter, .. } = self;
+        let compliant = |m: u8| matter.materials[usize::from(m)].compliance > 0.0;
+        let part = dt / f64::from(parts);
+        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, currents, half, part);
         for _ in 0..parts {
             advect::advance(
                 &carrier,
                 &mut self.particles,
+                &mut self.journeys,
                 &plan.effects,
-                &compliant,
+                compliant,
                 &mut self.gauges,
                 &mut self.count,
             );
@@ -358,28 +379,31 @@ impl<const D: usize> Simulation<D> {
         self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
         self.step += 1;
         let changed = self.apply_changes();
-        let before = self.flow.clone();
+        let mut before = std::mem::replace(&mut self.spare, Flow::default());
+        before.copy_from(&self.flow);
         // After a sudden change the flow before says nothing about the one to come.
         let ahead = (!changed).then(|| self.ahead(self.expected_step(dt)));
         if let (Some(previous), false) = (&self.previous, changed) {
             self.flow.extrapolate(&previous.flow, dt / previous.dt);
         }
-        self.solve(ahead.flatten().map(|t| (t, before.translation())), &mut seconds)?;
-        self.previous = (!changed).then_some(Before { flow: before, dt });
+        let solved = self.solve(ahead.flatten().map(|t| (t, &before)), &mut seconds);
+        let older = self.previous.take();
+        if changed {
+            self.spare = before;
+        } else {
+            self.previous = Some(Before { flow: before, dt });
+            self.spare = older.map(|o| o.flow).unwrap_or_default();
+        }
+        solved?;
         self.measure(dt, limiter, seconds, extra + self.report.corrections, clock);
         Ok(())
-    }
-
-    /// Materials whose particles change their volume.
-    fn compliant(&self) -> Vec<bool> {
-        self.matter.materials.iter().map(|m| m.compliance > 0.0).collect()
     }
 
     /// Parts in which points go through a velocity frozen for `dt`: one as long as none crosses
     /// more than a cell, else parts of half a cell, for longer ways would crowd and thin out what a
     /// flow without divergence keeps apart.
-    fn parts(&self, velocity: &[[f64; 2]], dt: f64) -> u32 {
-        let crossed = dt * self.crossings(|node| velocity[node]);
+    fn parts(&self, dt: f64) -> u32 {
+        let crossed = dt * self.crossings(|node| self.half[node]);
         if crossed > 1.0 { (2.0 * crossed).ceil().min(1e4) as u32 } else { 1 }
     }
 
@@ -393,59 +417,59 @@ impl<const D: usize> Simulation<D> {
         clock.stops.iter().find(later).copied().unwrap_or(clock.end)
     }
 
-    /// Velocity in the middle of a step of `dt`, and corrections spent on it.
-    fn half_step_velocity(
-        &mut self,
-        dt: f64,
-        seconds: &mut Phases,
-    ) -> Result<(Vec<[f64; 2]>, u32), SimError> {
-        let now = self.flow.translation();
+    /// Finds the velocity in the middle of a step of `dt`; corrections spent on it.
+    fn find_half_step_velocity(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
+        self.flow.translation(&mut self.half);
         match (self.plan.method.integrator, &self.previous) {
-            (Integrator::Euler, _) => Ok((now, 0)),
+            (Integrator::Euler, _) => Ok(0),
             (Integrator::Extrapolated, Some(before)) => {
                 let f = 0.5 * dt / before.dt;
-                let half = now
-                    .iter()
-                    .zip(&before.flow.velocity)
-                    .map(|(u, b)| [u[0] + f * (u[0] - b[0]), u[1] + f * (u[1] - b[1])])
-                    .collect();
-                Ok((half, 0))
+                for (u, b) in self.half.iter_mut().zip(&before.flow.velocity) {
+                    *u = [u[0] + f * (u[0] - b[0]), u[1] + f * (u[1] - b[1])];
+                }
+                Ok(0)
             }
             (Integrator::Extrapolated | Integrator::Midpoint, _) => {
-                self.solve_half_step(dt, now, seconds)
+                self.solve_half_step(dt, seconds)
             }
         }
     }
 
-    /// Moves a copy of the particles half a step and solves there.
-    fn solve_half_step(
-        &mut self,
-        dt: f64,
-        now: Vec<[f64; 2]>,
-        seconds: &mut Phases,
-    ) -> Result<(Vec<[f64; 2]>, u32), SimError> {
+    /// Moves a copy of the particles half a step with the velocity in `half`, solves there, and leaves
+    /// that velocity in `half`.
+    fn solve_half_step(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
         let plan = self.plan.clone();
         let phase = Instant::now();
-        let mut ahead = self.particles.clone();
-        let compliant = self.compliant();
-        let parts = self.parts(&now, 0.5 * dt);
-        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, &now, 0.5 * dt / f64::from(parts));
-        let mut ignored = Count::default();
+        let mut there = self.particles.clone();
+        let parts = self.parts(0.5 * dt);
+        let Simulation { currents, half, matter, journeys, .. } = self;
+        let compliant = |m: u8| matter.materials[usize::from(m)].compliance > 0.0;
+        let part = 0.5 * dt / f64::from(parts);
+        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, currents, half, part);
+        let (effects, no_gauges, mut ignored) = (&plan.effects, &mut [], Count::default());
         for _ in 0..parts {
-            advect::advance(&carrier, &mut ahead, &plan.effects, &compliant, &mut [], &mut ignored);
+            advect::advance(
+                &carrier,
+                &mut there,
+                journeys,
+                effects,
+                compliant,
+                no_gauges,
+                &mut ignored,
+            );
         }
-        self.population.control(&plan.mesh, &mut ahead, &mut ignored);
+        self.population.control(&plan.mesh, &mut there, &mut ignored);
         seconds.motion += phase.elapsed().as_secs_f64();
-        let here = std::mem::replace(&mut self.particles, ahead);
+        let here = std::mem::replace(&mut self.particles, there);
         let flow = self.flow.clone();
         // At the first step a mode must at worst turn round: half a step ahead, neither more nor
         // less, makes that the trapezoidal rule.
         let ahead = self.ahead(dt).map(|t| if self.previous.is_none() { 0.5 * dt } else { t });
-        let solved = self.solve(ahead.map(|t| (t, now)), seconds);
-        let half = std::mem::replace(&mut self.flow, flow).translation();
+        let solved = self.solve(ahead.map(|t| (t, &flow)), seconds);
+        std::mem::replace(&mut self.flow, flow).translation(&mut self.half);
         self.particles = here;
         solved?;
-        Ok((half, self.report.corrections))
+        Ok(self.report.corrections)
     }
 
     /// Applies the changes of matter that are due; whether there were any.
@@ -490,13 +514,14 @@ impl<const D: usize> Simulation<D> {
     /// loads are taken, and the velocity before.
     fn solve(
         &mut self,
-        restoring: Option<(f64, Vec<[f64; 2]>)>,
+        restoring: Option<(f64, &Flow<D>)>,
         seconds: &mut Phases,
     ) -> Result<(), SimError> {
         let plan = self.plan.clone();
         let phase = Instant::now();
         let (step, time) = (self.step, self.si_time());
-        self.factors_of_points = self.quadrature.factors().to_vec();
+        self.factors_of_points.clear();
+        self.factors_of_points.extend_from_slice(self.quadrature.factors());
         self.quadrature
             .update(&plan.mesh, &self.particles, &self.matter.materials, self.version)
             .map_err(|mut source| {
@@ -524,27 +549,19 @@ impl<const D: usize> Simulation<D> {
         Ok(())
     }
 
-    fn update_restoring(&mut self, restoring: Option<(f64, Vec<[f64; 2]>)>) {
-        match restoring {
-            Some((ahead, before)) => {
-                // First-order stepping has no other use for the velocity before.
-                let before = match self.plan.method.integrator {
-                    Integrator::Euler => vec![[0.0; 2]; before.len()],
-                    Integrator::Extrapolated | Integrator::Midpoint => before,
-                };
-                let (means, slopes) = (self.weight.means(), self.weight.slopes());
-                let viscosities = self.matter.materials.iter().map(|m| m.viscosity);
-                let ahead = Ahead {
-                    gravity: self.matter.gravity,
-                    time: ahead,
-                    weakest: viscosities.fold(f64::INFINITY, f64::min),
-                };
-                let mesh = &self.plan.mesh;
-                let density = (means.as_slice(), slopes.as_slice());
-                self.restoring.update(mesh, &self.restoring_faces, density, ahead, before);
-            }
-            None => self.restoring.clear(),
-        }
+    fn update_restoring(&mut self, restoring: Option<(f64, &Flow<D>)>) {
+        let Some((ahead, before)) = restoring else { return self.restoring.clear() };
+        // First-order stepping has no other use for the velocity before.
+        let still = self.plan.method.integrator == Integrator::Euler;
+        let before = before.velocity.iter().map(|u| if still { [0.0; 2] } else { [u[0], u[1]] });
+        let viscosities = self.matter.materials.iter().map(|m| m.viscosity);
+        let ahead = Ahead {
+            gravity: self.matter.gravity,
+            time: ahead,
+            weakest: viscosities.fold(f64::INFINITY, f64::min),
+        };
+        let mesh = &self.plan.mesh;
+        self.restoring.update(mesh, &self.restoring_faces, &self.weight, ahead, before);
     }
 
     fn update_load(&mut self) {
@@ -559,13 +576,34 @@ impl<const D: usize> Simulation<D> {
             self.add_weight(|[x, y]| acceleration.each_ref().map(|a| a.at(x, y)));
         }
         self.other_load.copy_from_slice(&self.load);
-        let g = self.matter.gravity.map(|g| g * plan.units.acceleration());
-        self.add_weight(|_| g);
+        self.add_gravity();
+    }
+
+    /// Adds `integral density g N`.
+    fn add_gravity(&mut self) {
+        let Simulation { plan, weight, quadrature, load, matter, .. } = self;
+        let (mesh, g) = (&plan.mesh, matter.gravity);
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            let area = mesh.cell_area(cell);
+            let mut mass = [0.0; 9];
+            match plan.method.quadrature {
+                Rule::Mixture | Rule::Laminate => mass = weight.nodal_masses(cell),
+                Rule::Particles => quadrature.for_points(cell, |p, shape| {
+                    for (mass, n) in mass.iter_mut().zip(&shape.n) {
+                        *mass += p.weight * p.density * n;
+                    }
+                }),
+            }
+            for (node, mass) in mesh.cell_nodes(cell).into_iter().zip(mass) {
+                load[node][0] += area * mass * g[0];
+                load[node][1] += area * mass * g[1];
+            }
+        }
     }
 
     /// Adds `integral density a N` for an acceleration in SI units and coordinates.
     fn add_weight(&mut self, acceleration: impl Fn([f64; 2]) -> [f64; 2]) {
-        let plan = self.plan.clone();
+        let Simulation { plan, weight, quadrature, load, .. } = self;
         let (mesh, unit) = (&plan.mesh, plan.units.acceleration());
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
             let area = mesh.cell_area(cell);
@@ -578,14 +616,14 @@ impl<const D: usize> Simulation<D> {
                 }
             };
             match plan.method.quadrature {
-                Rule::Mixture | Rule::Laminate => self.weight.for_points(cell, &mut add),
-                Rule::Particles => self.quadrature.for_points(cell, |p, shape| {
+                Rule::Mixture | Rule::Laminate => weight.for_points(cell, &mut add),
+                Rule::Particles => quadrature.for_points(cell, |p, shape| {
                     add(p.weight * p.density, p.r, &shape.n);
                 }),
             }
-            for (a, node) in mesh.cell_nodes(cell).into_iter().enumerate() {
-                self.load[node][0] += force[a][0];
-                self.load[node][1] += force[a][1];
+            for (node, force) in mesh.cell_nodes(cell).into_iter().zip(force) {
+                load[node][0] += force[0];
+                load[node][1] += force[1];
             }
         }
     }
@@ -650,8 +688,8 @@ impl<const D: usize> Run for Simulation<D> {
     fn replan(&mut self, plan: Arc<Plan>) {
         self.plan = plan;
     }
-    fn state(&self) -> State {
-        self.save()
+    fn save(&self, state: &mut State) {
+        Simulation::save(self, state);
     }
     fn restore(&mut self, state: &State) -> Result<(), StateError> {
         self.load(state)

@@ -47,16 +47,33 @@ impl State {
         self.columns.insert(name.into(), column);
     }
 
-    pub fn put_floats(&mut self, name: &str, values: impl Into<Vec<f64>>) {
-        self.insert(name, Column::Floats(values.into()));
+    /// Writes a column of numbers; where there was one its room is used again.
+    pub fn put_floats(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
+        match self.columns.get_mut(name) {
+            Some(Column::Floats(kept)) => refill(kept, values),
+            _ => self.insert(name, Column::Floats(values.into_iter().collect())),
+        }
     }
 
-    pub fn put_counts(&mut self, name: &str, values: impl Into<Vec<u64>>) {
-        self.insert(name, Column::Counts(values.into()));
+    /// As [`State::put_floats`], of counts.
+    pub fn put_counts(&mut self, name: &str, values: impl IntoIterator<Item = u64>) {
+        match self.columns.get_mut(name) {
+            Some(Column::Counts(kept)) => refill(kept, values),
+            _ => self.insert(name, Column::Counts(values.into_iter().collect())),
+        }
     }
 
-    pub fn put_bytes(&mut self, name: &str, values: impl Into<Vec<u8>>) {
-        self.insert(name, Column::Bytes(values.into()));
+    /// As [`State::put_floats`], of bytes.
+    pub fn put_bytes(&mut self, name: &str, values: impl IntoIterator<Item = u8>) {
+        match self.columns.get_mut(name) {
+            Some(Column::Bytes(kept)) => refill(kept, values),
+            _ => self.insert(name, Column::Bytes(values.into_iter().collect())),
+        }
+    }
+
+    /// Takes a column out.
+    pub fn remove(&mut self, name: &str) {
+        self.columns.remove(name);
     }
 
     /// A column that only some runs have.
@@ -126,25 +143,34 @@ impl State {
     }
 }
 
+fn refill<T>(kept: &mut Vec<T>, values: impl IntoIterator<Item = T>) {
+    kept.clear();
+    kept.extend(values);
+}
+
 fn wrong_length(name: &str, found: usize, expected: usize) -> StateError {
     StateError::Length { name: name.into(), found, expected }
 }
 
+fn flat<const N: usize>(tuples: &[[f64; N]]) -> impl Iterator<Item = f64> + '_ {
+    tuples.as_flattened().iter().copied()
+}
+
 fn save_particles(p: &Particles, s: &mut State) {
-    s.put_floats("particles.position", p.position.as_flattened());
-    s.put_floats("particles.volume", p.volume.as_slice());
-    s.put_bytes("particles.material", p.material.as_slice());
+    s.put_floats("particles.position", flat(&p.position));
+    s.put_floats("particles.volume", p.volume.iter().copied());
+    s.put_bytes("particles.material", p.material.iter().copied());
     if let Some(d) = &p.director {
-        s.put_floats("particles.director", d.as_flattened());
+        s.put_floats("particles.director", flat(d));
     }
     if let Some(v) = &p.viscosity {
-        s.put_floats("particles.viscosity", v.as_slice());
+        s.put_floats("particles.viscosity", v.iter().copied());
     }
     if let Some(d) = &p.density {
-        s.put_floats("particles.density", d.as_slice());
+        s.put_floats("particles.density", d.iter().copied());
     }
     if let Some(m) = &p.mark {
-        s.put_bytes("particles.mark", m.iter().map(|&m| u8::from(m)).collect::<Vec<_>>());
+        s.put_bytes("particles.mark", m.iter().map(|&m| u8::from(m)));
     }
 }
 
@@ -219,10 +245,9 @@ fn save_row(row: &Row, s: &mut State) {
             row.director_error,
         ],
     );
-    s.put_floats("row.alignment", row.alignment.as_slice());
-    let gauges = row.gauges.iter().flat_map(|g| [g.volume, g.rate]);
-    s.put_floats("row.gauges", gauges.collect::<Vec<_>>());
-    s.put_floats("row.drift", row.drift.as_slice());
+    s.put_floats("row.alignment", row.alignment);
+    s.put_floats("row.gauges", row.gauges.iter().flat_map(|g| [g.volume, g.rate]));
+    s.put_floats("row.drift", row.drift.iter().copied());
     save_phases("row.seconds", &row.seconds, s);
 }
 
@@ -301,32 +326,32 @@ pub fn load_phases(name: &str, s: &State) -> Result<Phases, StateError> {
 
 impl<const D: usize> Simulation<D> {
     /// Everything that the next step depends on.
-    pub(super) fn save(&self) -> State {
-        let mut s = State::default();
-        save_particles(&self.particles, &mut s);
-        s.put_floats("flow.velocity", self.flow.velocity.as_flattened());
-        s.put_floats("flow.pressure", self.flow.pressure.as_flattened());
+    pub(super) fn save(&self, s: &mut State) {
+        save_particles(&self.particles, s);
+        s.put_floats("flow.velocity", flat(&self.flow.velocity));
+        s.put_floats("flow.pressure", flat(&self.flow.pressure));
+        let names = ["previous.velocity", "previous.pressure", "previous.step"];
         if let Some(Before { flow, dt }) = &self.previous {
-            s.put_floats("previous.velocity", flow.velocity.as_flattened());
-            s.put_floats("previous.pressure", flow.pressure.as_flattened());
-            s.put_floats("previous.step", [*dt]);
+            s.put_floats(names[0], flat(&flow.velocity));
+            s.put_floats(names[1], flat(&flow.pressure));
+            s.put_floats(names[2], [*dt]);
+        } else {
+            names.iter().for_each(|name| s.remove(name));
         }
         // The points follow from the factors that they were made with; the new factors from both.
-        s.put_floats("quadrature.factors", self.factors_of_points.as_slice());
-        s.put_floats("gauges", self.gauges.iter().map(|g| g.volume).collect::<Vec<_>>());
+        s.put_floats("quadrature.factors", self.factors_of_points.iter().copied());
+        s.put_floats("gauges", self.gauges.iter().map(|g| g.volume));
         if let Some(dye) = &self.dye {
-            let points: Vec<f64> = dye.lines.iter().flatten().flatten().copied().collect();
-            s.put_floats("dye.points", points);
-            s.put_counts("dye.lines", dye.lines.iter().map(|l| l.len() as u64).collect::<Vec<_>>());
+            s.put_floats("dye.points", dye.lines.iter().flatten().flatten().copied());
+            s.put_counts("dye.lines", dye.lines.iter().map(|l| l.len() as u64));
         }
         let c = self.count;
         s.put_counts("count", [c.splits, c.merges, c.held, c.left, c.healed]);
         s.put_counts("progress", [self.step, u64::from(self.version), self.next_change as u64]);
         s.put_floats("time", [self.time]);
-        s.put_floats("baseline", self.baseline.as_slice());
+        s.put_floats("baseline", self.baseline.iter().copied());
         s.put_floats("other_power", [self.last_other_power]);
-        save_row(&self.row, &mut s);
-        s
+        save_row(&self.row, s);
     }
 
     /// Goes back, or ahead, to a state of a run of the same plan. After an error the run is what it

@@ -31,6 +31,7 @@
 //! of the order `rho g h^2/eta_weak`: heavy fluid at rest below one a million times thinner, in steps
 //! of a thousandth of its own relaxation time.
 
+use super::weight::Weight;
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Face;
 use crate::space::shape::NODES;
@@ -88,6 +89,8 @@ pub struct Restoring {
     direction: [f64; 2],
     /// `u_before` at the nodes.
     before: Vec<[f64; 2]>,
+    /// Mean of each cell.
+    density: Vec<f64>,
 }
 
 impl Restoring {
@@ -97,23 +100,26 @@ impl Restoring {
         self.cells.clear();
     }
 
-    /// From the mean density of each cell and its gradient in reference coordinates, and the
-    /// velocity of the solution before.
+    /// From the density of the cells, and the velocity of the solution before at the nodes.
     pub fn update(
         &mut self,
         mesh: &Mesh,
         faces: &[Face],
-        (density, slopes): (&[f64], &[[f64; 2]]),
+        weight: &Weight,
         Ahead { gravity, time: ahead, weakest }: Ahead,
-        before: Vec<[f64; 2]>,
+        before: impl Iterator<Item = [f64; 2]>,
     ) {
         self.clear();
-        self.before = before;
+        self.before.clear();
+        self.before.extend(before);
         let g = gravity[0].hypot(gravity[1]);
         if g == 0.0 {
             return;
         }
         self.direction = gravity.map(|c| c / g);
+        self.density.clear();
+        self.density.extend((0..mesh.cells()).map(|cell| weight.mean(cell)));
+        let density = &self.density;
         let least = LEAST_JUMP * density.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
         for face in faces {
             let [a, b] = face.cells.map(|c| c as usize);
@@ -124,9 +130,10 @@ impl Restoring {
                 self.faces.push(FaceTerm { cell: a, normal: face.normal, strength });
             }
         }
-        self.cells.extend(slopes.iter().enumerate().map(|(cell, slope)| {
-            let [hx, hy] = mesh.cell_size(cell);
-            let [x, y] = [slope[0] * self.direction[0], slope[1] * self.direction[1]];
+        let direction = self.direction;
+        self.cells.extend((0..mesh.cells()).map(|cell| {
+            let ([hx, hy], slope) = (mesh.cell_size(cell), weight.slope(cell));
+            let [x, y] = [slope[0] * direction[0], slope[1] * direction[1]];
             let growth = 2.0 * (x / hx + y / hy);
             if x + y <= least {
                 return 0.0;

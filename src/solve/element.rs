@@ -11,13 +11,13 @@
 //! Local unknowns are ordered component by component: `9 c + a` for component `c` (u, v, w) of
 //! node `a`. `D` is 2 for the classical continuum, 3 with Cosserat rotation.
 
-use super::quadrature::{CutStiffness, IntegrationPoint, Quadrature};
+use super::quadrature::{Content, CutStiffness, IntegrationPoint, Quadrature};
 use super::spin::SpinModes;
-use crate::laws::point::PointLaw;
+use crate::laws::point::{PointLaw, Sym2};
 use crate::simd::{Simd, dispatch, multiply_add};
 use crate::space::shape::{
-    CENTRE, D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, N_AT_GAUSS, NODES,
-    PRESSURE_MASS, Shape, Table,
+    CENTRE, D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, NODES, PRESSURE_MASS,
+    SLOPES_AT_GAUSS, Shape, Table, VALUES_AT_GAUSS,
 };
 
 /// Local unknowns with rotation; classical elements use the first 18.
@@ -104,6 +104,7 @@ impl Rates {
     }
 
     /// `|grad u|^2` of the symmetric part, `D:D`.
+    #[inline(always)]
     pub fn strain_squared(&self) -> f64 {
         0.5 * (self.d[0] * self.d[0] + self.d[1] * self.d[1] + self.trace * self.trace)
     }
@@ -148,86 +149,6 @@ impl<const D: usize> Stress<D> {
     }
 }
 
-/// [`Gradient`]s or [`Stress`]es at the nine Gauss points, component by component.
-///
-/// Sums over nodes or points then run over contiguous numbers.
-struct GaussField<const D: usize> {
-    x: [[f64; 9]; D],
-    y: [[f64; 9]; D],
-    w: [f64; 9],
-}
-
-impl<const D: usize> GaussField<D> {
-    #[inline(always)]
-    fn gradient<const FMA: bool>(u: &Nodal<D>, [hx, hy]: [f64; 2]) -> Self {
-        let mut out = GaussField { x: [[0.0; 9]; D], y: [[0.0; 9]; D], w: [0.0; 9] };
-        for c in 0..D {
-            let mut component = [0.0; NODES];
-            for a in 0..NODES {
-                component[a] = u[a][c];
-            }
-            out.x[c] = combine::<FMA>(&D_XI_AT_GAUSS.by_node, &component, 2.0 / hx);
-            out.y[c] = combine::<FMA>(&D_ETA_AT_GAUSS.by_node, &component, 2.0 / hy);
-            if c == 2 {
-                out.w = combine::<FMA>(&N_AT_GAUSS.by_node, &component, 1.0);
-            }
-        }
-        out
-    }
-
-    #[inline(always)]
-    fn gradient_at(&self, g: usize) -> Gradient<D> {
-        let mut out = Gradient { x: [0.0; D], y: [0.0; D], w: self.w[g] };
-        for c in 0..D {
-            (out.x[c], out.y[c]) = (self.x[c][g], self.y[c][g]);
-        }
-        out
-    }
-
-    #[inline(always)]
-    fn set_stress(&mut self, g: usize, t: &Stress<D>) {
-        for c in 0..D {
-            (self.x[c][g], self.y[c][g]) = (t.x[c], t.y[c]);
-        }
-        self.w[g] = t.w;
-    }
-
-    /// Nodal forces of stresses.
-    #[inline(always)]
-    fn force<const FMA: bool>(&self, [hx, hy]: [f64; 2]) -> Nodal<D> {
-        let mut f = [[0.0; D]; NODES];
-        for c in 0..D {
-            let x = combine::<FMA>(&D_XI_AT_GAUSS.by_point, &self.x[c], 2.0 / hx);
-            let y = combine::<FMA>(&D_ETA_AT_GAUSS.by_point, &self.y[c], 2.0 / hy);
-            for a in 0..NODES {
-                f[a][c] = x[a] + y[a];
-            }
-        }
-        if D == 3 {
-            let n = combine::<FMA>(&N_AT_GAUSS.by_point, &self.w, 1.0);
-            for a in 0..NODES {
-                f[a][D - 1] += n[a];
-            }
-        }
-        f
-    }
-}
-
-/// `scale sum_k v[k] table[k]`
-#[inline(always)]
-fn combine<const FMA: bool>(table: &[[f64; 9]; 9], v: &[f64; 9], scale: f64) -> [f64; 9] {
-    let mut out = [0.0; 9];
-    for k in 0..9 {
-        for i in 0..9 {
-            out[i] = multiply_add::<FMA>(v[k], table[k][i], out[i]);
-        }
-    }
-    for i in 0..9 {
-        out[i] *= scale;
-    }
-    out
-}
-
 /// What a cell's stresses do: nodal forces, and powers that come with them.
 #[derive(Clone, Copy)]
 pub struct Internal<const D: usize> {
@@ -238,34 +159,54 @@ pub struct Internal<const D: usize> {
 }
 
 impl<const D: usize> Internal<D> {
-    /// Of a cell of this size with nodal values `u`.
-    pub fn new(
+    const NONE: Self = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
+
+    /// Of up to [`TOGETHER`] cells. `spin`: of all cells; `of(cell)`: its size and nodal values, `None`
+    /// for a solid one.
+    pub fn of_cells(
         simd: Simd,
         quadrature: &Quadrature,
-        cell: usize,
-        size: [f64; 2],
-        u: &Nodal<D>,
-    ) -> Self {
-        let mut out = match quadrature.gauss_points(cell) {
-            None => Internal::at_any_points(quadrature, cell, size, u),
-            Some(points) => {
-                let cut = quadrature.cut(cell);
-                let mut points = *points;
-                for p in &mut points {
-                    p.law = p.law.without_excess();
-                    if let Some(cut) = cut {
-                        p.law = p.law.with_viscosity_scaled(cut.rest);
-                    }
-                }
-                let mut out = at_gauss_points(simd, &points, size, u);
-                cut.iter().for_each(|cut| out.add_cut(cut, u));
-                out
+        spin: &[Option<Box<SpinModes>>],
+        cells: std::ops::Range<usize>,
+        of: impl Fn(usize) -> Option<([f64; 2], Nodal<D>)>,
+    ) -> [Self; TOGETHER] {
+        let mut out = [Internal::NONE; TOGETHER];
+        let mut together = Together::<D>::EMPTY;
+        let mut any = false;
+        for (k, cell) in cells.clone().enumerate() {
+            let Some((size, u)) = of(cell) else { continue };
+            let Some(points) = quadrature.gauss_points(cell) else {
+                out[k] = Internal::at_any_points(quadrature, cell, size, &u);
+                continue;
+            };
+            any = true;
+            if let Content::Uniform { .. } = quadrature.content(cell) {
+                let law = points[0].law.without_excess();
+                together.set(k, size, &u, |_| law);
+                continue;
             }
-        };
-        if D == 3
-            && let Some(modes) = SpinModes::new(quadrature, cell, size)
-        {
-            out.dissipation += modes.add_force(u, &mut out.force);
+            let rest = quadrature.cut(cell).map(|cut| cut.rest);
+            together.set(k, size, &u, |g| {
+                let law = points[g].law.without_excess();
+                rest.map_or(law, |rest| law.with_viscosity_scaled(rest))
+            });
+        }
+        if any {
+            stresses(simd, &mut together);
+        }
+        for (k, cell) in cells.enumerate() {
+            if quadrature.gauss_points(cell).is_some() {
+                out[k] = together.internal(k);
+            }
+            let (cut, spin) = (quadrature.cut(cell), &spin[cell]);
+            if cut.is_none() && spin.is_none() {
+                continue;
+            }
+            let Some((_, u)) = of(cell) else { continue };
+            cut.iter().for_each(|cut| out[k].add_cut(cut, &u));
+            if let Some(spin) = spin {
+                out[k].dissipation += spin.add_force(&u, &mut out[k].force);
+            }
         }
         out
     }
@@ -280,7 +221,7 @@ impl<const D: usize> Internal<D> {
     }
 
     fn at_any_points(quadrature: &Quadrature, cell: usize, size: [f64; 2], u: &Nodal<D>) -> Self {
-        let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
+        let mut out = Internal::NONE;
         quadrature.for_points(cell, |p, shape| {
             let s = PointShape::new(shape, size);
             let p = IntegrationPoint { law: p.law.without_excess(), ..*p };
@@ -299,26 +240,197 @@ impl<const D: usize> Internal<D> {
     }
 }
 
+/// Cells whose stresses are computed together, one to a place of a vector.
+pub const TOGETHER: usize = 8;
+
+/// A number of each of them.
+type Lanes = [f64; TOGETHER];
+
+/// Cells whose points are those of the Gauss rule: nodal values, then nodal forces.
+struct Together<const D: usize> {
+    /// By component and node.
+    nodal: [[Lanes; NODES]; D],
+    laws: [LawLanes; 9],
+    /// Reference coordinates per length.
+    per_length: [Lanes; 2],
+    area: Lanes,
+    dissipation: Lanes,
+    strain: Lanes,
+}
+
+/// A [`PointLaw`] of each cell.
+#[derive(Clone, Copy)]
+struct LawLanes {
+    shear: [Lanes; 3],
+    dilation: Lanes,
+    coupling: Lanes,
+    couple: Lanes,
+}
+
+const ZERO: Lanes = [0.0; TOGETHER];
+
+impl LawLanes {
+    const ZERO: Self = LawLanes { shear: [ZERO; 3], dilation: ZERO, coupling: ZERO, couple: ZERO };
+
+    #[inline(always)]
+    fn set(&mut self, k: usize, law: &PointLaw) {
+        let Sym2 { a, b, c } = law.shear;
+        (self.shear[0][k], self.shear[1][k], self.shear[2][k]) = (a, b, c);
+        self.dilation[k] = law.dilation;
+        self.coupling[k] = law.coupling;
+        self.couple[k] = law.couple;
+    }
+
+    #[inline(always)]
+    fn get(&self, k: usize) -> PointLaw {
+        PointLaw {
+            shear: Sym2 { a: self.shear[0][k], b: self.shear[1][k], c: self.shear[2][k] },
+            dilation: self.dilation[k],
+            coupling: self.coupling[k],
+            couple: self.couple[k],
+        }
+    }
+}
+
+impl<const D: usize> Together<D> {
+    /// Places that no cell takes have no stiffness.
+    const EMPTY: Self = Together {
+        nodal: [[ZERO; NODES]; D],
+        laws: [LawLanes::ZERO; 9],
+        per_length: [ZERO; 2],
+        area: ZERO,
+        dissipation: ZERO,
+        strain: ZERO,
+    };
+
+    /// `law(g)`: at the Gauss points.
+    fn set(&mut self, k: usize, size: [f64; 2], u: &Nodal<D>, law: impl Fn(usize) -> PointLaw) {
+        for a in 0..NODES {
+            for c in 0..D {
+                self.nodal[c][a][k] = u[a][c];
+            }
+        }
+        self.area[k] = size[0] * size[1];
+        for c in 0..2 {
+            self.per_length[c][k] = 2.0 / size[c];
+        }
+        self.laws.iter_mut().enumerate().for_each(|(g, place)| place.set(k, &law(g)));
+    }
+
+    fn internal(&self, k: usize) -> Internal<D> {
+        let mut out =
+            Internal { dissipation: self.dissipation[k], strain: self.strain[k], ..Internal::NONE };
+        for a in 0..NODES {
+            for c in 0..D {
+                out.force[a][c] = self.nodal[c][a][k];
+            }
+        }
+        out
+    }
+}
+
 dispatch! {
-    /// [`Internal`] of a cell whose points are those of the Gauss rule.
-    fn at_gauss_points<const D: usize>(
-        points: &[IntegrationPoint; 9], size: [f64; 2], u: &Nodal<D>,
-    ) -> Internal<D> = at_gauss_points_kernel
+    /// Forces and powers of cells.
+    fn stresses<const D: usize>(cells: &mut Together<D>) = stresses_kernel
 }
 
 #[inline(always)]
-fn at_gauss_points_kernel<const LENGTH: usize, const FMA: bool, const D: usize>(
-    points: &[IntegrationPoint; 9],
-    size: [f64; 2],
-    u: &Nodal<D>,
-) -> Internal<D> {
-    let mut out = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
-    let mut field = GaussField::gradient::<FMA>(u, size);
-    for (g, p) in points.iter().enumerate() {
-        let rates = Rates::of(&field.gradient_at(g));
-        field.set_stress(g, &out.stress(p, &rates, size));
+fn stresses_kernel<const LENGTH: usize, const FMA: bool, const D: usize>(cells: &mut Together<D>) {
+    let (mut x, mut y, mut w) = ([[ZERO; 9]; D], [[ZERO; 9]; D], [ZERO; 9]);
+    for c in 0..D {
+        let (values, slopes) = up::<FMA>(&cells.nodal[c]);
+        x[c] = across::<FMA>(&SLOPES_AT_GAUSS, &values);
+        y[c] = across::<FMA>(&VALUES_AT_GAUSS, &slopes);
+        if c == 2 {
+            w = across::<FMA>(&VALUES_AT_GAUSS, &values);
+        }
     }
-    out.force = field.force::<FMA>(size);
+    let [px, py] = cells.per_length;
+    for g in 0..9 {
+        let weight = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3];
+        for k in 0..TOGETHER {
+            let mut gradient = Gradient { x: [0.0; D], y: [0.0; D], w: w[g][k] };
+            for c in 0..D {
+                gradient.x[c] = x[c][g][k] * px[k];
+                gradient.y[c] = y[c][g][k] * py[k];
+            }
+            let (rates, law) = (Rates::of(&gradient), cells.laws[g].get(k));
+            let volume = weight * cells.area[k];
+            cells.dissipation[k] += volume * rates.power(&law);
+            cells.strain[k] += volume * rates.strain_squared();
+            let stress = Stress::<D>::new(&law, &rates, volume);
+            for c in 0..D {
+                x[c][g][k] = stress.x[c] * px[k];
+                y[c][g][k] = stress.y[c] * py[k];
+            }
+            w[g][k] = stress.w;
+        }
+    }
+    for c in 0..D {
+        let along = across::<FMA>(&transposed(&SLOPES_AT_GAUSS), &x[c]);
+        let other = across::<FMA>(&transposed(&VALUES_AT_GAUSS), &y[c]);
+        cells.nodal[c] = down::<FMA>(&along, &other);
+        if c == 2 {
+            let value = across::<FMA>(&transposed(&VALUES_AT_GAUSS), &w);
+            add_rows::<FMA>(&mut cells.nodal[c], &transposed(&VALUES_AT_GAUSS), &value);
+        }
+    }
+}
+
+type Rows = [[f64; 3]; 3];
+
+const fn transposed(t: &Rows) -> Rows {
+    let [[a, b, c], [d, e, f], [g, h, i]] = *t;
+    [[a, d, g], [b, e, h], [c, f, i]]
+}
+
+/// Each row of three contracted: `out[3 j + i] = sum_a table[i][a] v[3 j + a]`.
+#[inline(always)]
+fn across<const FMA: bool>(table: &Rows, v: &[Lanes; 9]) -> [Lanes; 9] {
+    let mut out = [ZERO; 9];
+    for j in 0..3 {
+        for i in 0..3 {
+            for a in 0..3 {
+                for k in 0..TOGETHER {
+                    let sum = out[3 * j + i][k];
+                    out[3 * j + i][k] = multiply_add::<FMA>(table[i][a], v[3 * j + a][k], sum);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Adds columns contracted: `out[3 j + i] += sum_b table[j][b] v[3 b + i]`.
+#[inline(always)]
+fn add_rows<const FMA: bool>(out: &mut [Lanes; 9], table: &Rows, v: &[Lanes; 9]) {
+    for j in 0..3 {
+        for b in 0..3 {
+            for i in 0..3 {
+                for k in 0..TOGETHER {
+                    let sum = out[3 * j + i][k];
+                    out[3 * j + i][k] = multiply_add::<FMA>(table[j][b], v[3 * b + i][k], sum);
+                }
+            }
+        }
+    }
+}
+
+/// Nodal values at the heights of the Gauss points, and their slopes there.
+#[inline(always)]
+fn up<const FMA: bool>(v: &[Lanes; 9]) -> ([Lanes; 9], [Lanes; 9]) {
+    let (mut values, mut slopes) = ([ZERO; 9], [ZERO; 9]);
+    add_rows::<FMA>(&mut values, &VALUES_AT_GAUSS, v);
+    add_rows::<FMA>(&mut slopes, &SLOPES_AT_GAUSS, v);
+    (values, slopes)
+}
+
+/// The transpose of [`up`].
+#[inline(always)]
+fn down<const FMA: bool>(values: &[Lanes; 9], slopes: &[Lanes; 9]) -> [Lanes; 9] {
+    let mut out = [ZERO; 9];
+    add_rows::<FMA>(&mut out, &transposed(&VALUES_AT_GAUSS), values);
+    add_rows::<FMA>(&mut out, &transposed(&SLOPES_AT_GAUSS), slopes);
     out
 }
 
@@ -384,7 +496,7 @@ const fn reference_divergence(slope: &Table) -> [[f64; NODES]; 3] {
     let mut k = 0;
     while k < 81 {
         let (g, a) = (k / 9, k % 9);
-        let weighted = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3] * slope.by_point[g][a];
+        let weighted = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3] * slope[g][a];
         b[0][a] += weighted;
         b[1][a] += GAUSS_3[g % 3] * weighted;
         b[2][a] += GAUSS_3[g / 3] * weighted;
@@ -562,7 +674,18 @@ mod tests {
         std::array::from_fn(|a| std::array::from_fn(|c| ((3 * a + 7 * c) as f64).sin()))
     }
 
-    /// The loop over points that [`GaussField`] replaces.
+    /// Of one of some cells that are computed together.
+    fn internal_at<const D: usize>(simd: Simd, lane: usize, u: &Nodal<D>) -> Internal<D> {
+        let mut cells = Together::<D>::EMPTY;
+        let points = points();
+        cells.set(lane, SIZE, u, |g| points[g].law);
+        stresses(simd, &mut cells);
+        let none = cells.internal((lane + 1) % TOGETHER);
+        assert!(none.force.iter().flatten().all(|&f| f == 0.0));
+        cells.internal(lane)
+    }
+
+    /// The loop over points that [`Together`] replaces.
     fn force_point_by_point<const D: usize>(u: &Nodal<D>) -> Nodal<D> {
         let mut f = [[0.0; D]; NODES];
         for p in points() {
@@ -576,11 +699,10 @@ mod tests {
     fn stiffness_times_vector_is_the_internal_force<const D: usize>() {
         let (k, u) = (stiffness::<D>(), some_values::<D>());
         for simd in crate::simd::all() {
-            internal_force_is_that_of_the_stiffness(
-                &k,
-                &u,
-                &at_gauss_points(simd, &points(), SIZE, &u),
-            );
+            for lane in [0, 5] {
+                let internal = internal_at(simd, lane, &u);
+                internal_force_is_that_of_the_stiffness(&k, &u, &internal);
+            }
         }
     }
 
@@ -625,7 +747,7 @@ mod tests {
             let (x, y) = ((a % 3) as f64 * 0.5 * SIZE[0], (a / 3) as f64 * 0.5 * SIZE[1]);
             [-0.9 * y + 0.2, 0.9 * x - 0.1, 0.9]
         });
-        let internal = at_gauss_points(Simd::detect(), &points(), SIZE, &u);
+        let internal = internal_at(Simd::detect(), 0, &u);
         assert!(internal.force.iter().flatten().all(|f| f.abs() < 1e-13));
         assert!(internal.dissipation < 1e-25);
     }

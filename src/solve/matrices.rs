@@ -34,6 +34,8 @@ pub struct Matrices<const D: usize> {
     pub cells: Vec<CellMatrix<D>>,
     /// Of the skeleton, centres condensed and all terms added: what is factored.
     pub blocks: Vec<CellBlocks<D>>,
+    /// Of cells whose coupling exceeds their shear viscosity.
+    pub spin: Vec<Option<Box<SpinModes>>>,
     built_from: Vec<Content>,
     /// Those that were computed at the last update.
     fresh: Vec<Fresh<D>>,
@@ -43,6 +45,7 @@ struct Fresh<const D: usize> {
     cell: usize,
     matrix: CellMatrix<D>,
     blocks: CellBlocks<D>,
+    spin: Option<Box<SpinModes>>,
 }
 
 /// What matrices are made from.
@@ -70,6 +73,7 @@ impl<const D: usize> Matrices<D> {
         Matrices {
             cells: vec![CellMatrix::ZERO; cells],
             blocks: vec![Self::NO_BLOCKS; cells],
+            spin: (0..cells).map(|_| None).collect(),
             built_from: vec![Content::Unknown; cells],
             fresh: vec![],
         }
@@ -88,7 +92,9 @@ impl<const D: usize> Matrices<D> {
             let known = content != Content::Mixed && content == *built_from;
             if content != Content::Solid && !known {
                 let blocks = Self::NO_BLOCKS;
-                self.fresh.push(Fresh { cell, matrix: CellMatrix::ZERO, blocks });
+                let matrix = CellMatrix::ZERO;
+                let spin = self.spin[cell].take();
+                self.fresh.push(Fresh { cell, matrix, blocks, spin });
                 *built_from = content;
             }
         }
@@ -99,8 +105,9 @@ impl<const D: usize> Matrices<D> {
                 self.fresh[k].add_face(from, face);
             }
         }
-        for fresh in &self.fresh {
+        for fresh in &mut self.fresh {
             self.cells[fresh.cell] = fresh.matrix;
+            self.spin[fresh.cell] = fresh.spin.take();
             let before = &mut self.blocks[fresh.cell];
             let bits = |b: &CellBlocks<D>, k: usize| b[k].map(|row| row.map(f64::to_bits));
             if (0..before.len()).any(|k| bits(before, k) != bits(&fresh.blocks, k)) {
@@ -130,10 +137,15 @@ impl<const D: usize> Fresh<D> {
         if let Some(cut) = cut {
             add_cut_stiffness(&mut k, cut);
         }
+        // In the room of those before.
+        let before = self.spin.take();
         if D == 3
             && let Some(modes) = SpinModes::new(quadrature, cell, size)
         {
             modes.add_stiffness(&mut k);
+            let mut spin = before.unwrap_or_default();
+            *spin = modes;
+            self.spin = Some(spin);
         }
         if restoring.cell_strength(cell) > 0.0 {
             for i in 0..2 * NODES {

@@ -117,8 +117,8 @@ impl Strip {
     }
 }
 
-/// The sheet that a material forms, if it forms one.
-pub fn sheet(particles: &[Labelled], second: bool) -> Option<Strip> {
+/// The sheet that a material forms, if it forms one. What is in `room` is void.
+pub fn sheet(particles: &[Labelled], second: bool, room: &mut Vec<f64>) -> Option<Strip> {
     let of = |label| particles.iter().filter(move |p| p.1 == label).map(|p| p.0);
     // In a round window a strip's ends do not tilt its axes.
     let m = Moments::new(of(second).filter(|p| p[0].hypot(p[1]) < WINDOW))?;
@@ -127,8 +127,10 @@ pub fn sheet(particles: &[Labelled], second: bool) -> Option<Strip> {
     if m.count < FEWEST || width > WIDEST || m.deviation_along < SLENDER * m.deviation {
         return None;
     }
-    let mut along: Vec<f64> = of(second).map(|p| m.coordinates(p)[0]).collect();
-    along.sort_by(f64::total_cmp);
+    let along = &mut *room;
+    along.clear();
+    along.extend(of(second).map(|p| m.coordinates(p)[0]));
+    along.sort_unstable_by(f64::total_cmp);
     let (first, last) = (*along.first()?, *along.last()?);
     if last - first < SHORTEST || along.windows(2).any(|w| w[1] - w[0] > GAP) {
         return None;
@@ -143,8 +145,10 @@ pub fn sheet(particles: &[Labelled], second: bool) -> Option<Strip> {
         return None;
     }
     // As many particles lie in the strip as are of its material.
-    let mut distance: Vec<f64> = particles.iter().map(|p| m.coordinates(p.0)[1].abs()).collect();
     let count = along.len();
+    let distance = room;
+    distance.clear();
+    distance.extend(particles.iter().map(|p| m.coordinates(p.0)[1].abs()));
     let (_, &mut half, _) = distance.select_nth_unstable_by(count - 1, f64::total_cmp);
     let offset = m.across[0] * m.mean[0] + m.across[1] * m.mean[1];
     Some(Strip { normal: m.across, offset, width: 2.0 * half })
@@ -193,13 +197,13 @@ mod tests {
             for width in [0.3, 0.5, 0.8] {
                 let of_sheet = |p| (distance(p, angle) - offset).abs() < 0.5 * width;
                 let around = particles(seed, of_sheet);
-                let strip = sheet(&around, true);
+                let strip = sheet(&around, true, &mut Vec::new());
                 assert!(strip.is_some(), "{seed} {width}");
                 let strip = strip.unwrap();
                 let sine = strip.normal[0] * angle.sin() - strip.normal[1] * angle.cos();
                 assert!(sine.abs() < 0.15, "{seed} {width}: {strip:?}");
                 assert!((strip.width - width).abs() < 0.2, "{seed} {width}: {strip:?}");
-                assert!(sheet(&around, false).is_none());
+                assert!(sheet(&around, false, &mut Vec::new()).is_none());
                 assert!(!is_drop(&around, true) && !is_drop(&around, false));
             }
         }
@@ -221,10 +225,10 @@ mod tests {
             });
             for label in [false, true] {
                 for around in [&edge, &disc] {
-                    assert!(sheet(around, label).is_none(), "{seed}");
+                    assert!(sheet(around, label, &mut vec![]).is_none(), "{seed}");
                     assert!(!is_drop(around, label), "{seed}");
                 }
-                assert!(sheet(&corner, label).is_none(), "{seed}");
+                assert!(sheet(&corner, label, &mut vec![]).is_none(), "{seed}");
             }
         }
     }
@@ -235,7 +239,10 @@ mod tests {
             let [x, y] = [0.5 * (seed as f64).sin(), 0.5 * (2.0 * seed as f64).sin()];
             let around = particles(seed, |p| (p[0] - x).hypot(p[1] - y) < 0.4);
             assert!(is_drop(&around, true) && !is_drop(&around, false));
-            assert!(sheet(&around, true).is_none() && sheet(&around, false).is_none());
+            assert!(
+                sheet(&around, true, &mut Vec::new()).is_none()
+                    && sheet(&around, false, &mut Vec::new()).is_none()
+            );
         }
     }
 }

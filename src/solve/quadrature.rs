@@ -22,11 +22,12 @@ use super::minority;
 use crate::laws::point::{Mixture, PointLaw};
 use crate::plan::material::{Material, Texture};
 use crate::scene::Quadrature as Rule;
-use crate::space::fit::{Degree, Fit};
+use crate::space::fit::{Degree, Fit, Polynomial};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_3, GAUSS_3X3, GAUSS_6X6, SUBPOINTS, Shape};
 use crate::threads::{self, Divisible};
+use std::cell::RefCell;
 
 /// Cells that are worth a task of their own.
 const GRAIN: usize = 32;
@@ -93,6 +94,8 @@ pub struct Quadrature {
     /// Factor on each material's volume in cut cells; see [`Quadrature::keep_volumes`].
     factors: Vec<f64>,
     materials: usize,
+    /// Cells to be evaluated: room that is kept.
+    fresh: Vec<bool>,
 }
 
 /// A cell that holds no particles though no background fills it.
@@ -129,6 +132,7 @@ impl Quadrature {
             fractions: vec![0.0; cells * materials],
             factors: vec![1.0; materials],
             materials,
+            fresh: vec![false; cells],
         }
     }
 
@@ -207,7 +211,8 @@ impl Quadrature {
 
     /// Area of a material as the solver sees it.
     pub fn projected_area(&self, mesh: &Mesh, material: usize) -> f64 {
-        (0..mesh.cells()).map(|c| self.fraction(c, material) * mesh.cell_area(c)).sum()
+        let share = |cell| [self.fraction(cell, material) * mesh.cell_area(cell)];
+        threads::sum(0..mesh.cells(), share)[0]
     }
 
     /// Evaluates all cells whose content is not known to be unchanged. `particles` sorted.
@@ -222,7 +227,6 @@ impl Quadrature {
         if self.rule == Rule::Particles {
             self.points.clear();
         }
-        let mut fresh = vec![false; mesh.cells()];
         for cell in 0..mesh.cells() {
             let content = if mesh.solid[cell] {
                 Content::Solid
@@ -237,7 +241,7 @@ impl Quadrature {
             let content = if moving { Content::Mixed } else { content };
             let unchanged = content != Content::Mixed && content == self.content[cell];
             self.content[cell] = content;
-            fresh[cell] = !unchanged;
+            self.fresh[cell] = !unchanged;
             if self.rule == Rule::Particles {
                 self.list(mesh, cell, particles, materials);
             }
@@ -259,12 +263,14 @@ impl Quadrature {
                 compliance: &mut self.compliance,
                 fractions: &mut self.fractions,
             };
+            let fresh = &self.fresh;
             threads::for_parts(cells, 0..mesh.cells(), GRAIN, |range, mut cells| {
-                let mut scratch = None;
-                for (k, cell) in range.enumerate().filter(|&(_, c)| fresh[c]) {
-                    let scratch = scratch.get_or_insert_with(|| Scratch::new(materials.len()));
-                    cells.mix(k, cell, from, scratch);
-                }
+                SCRATCH.with_borrow_mut(|scratch| {
+                    scratch.prepare(materials.len());
+                    for (k, cell) in range.enumerate().filter(|&(_, c)| fresh[c]) {
+                        cells.mix(k, cell, from, scratch);
+                    }
+                });
             });
             self.keep_volumes(mesh, particles);
         }
@@ -282,24 +288,20 @@ impl Quadrature {
     /// which shifts all of its rim by the same small distance (a hundredth of a cell on the
     /// silo). Without it the projected volume of the grains wanders by 0.3 %.
     fn keep_volumes(&mut self, mesh: &Mesh, particles: &Particles) {
-        let n = self.materials;
-        let volume = particles.volumes(n);
-        let mut area = 0.0;
-        let mut projected = vec![0.0; n];
-        let mut response = vec![0.0; n];
-        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            area += mesh.cell_area(cell);
-            for m in 0..n {
-                let phi = self.fraction(cell, m);
-                projected[m] += mesh.cell_area(cell) * phi;
-                response[m] += mesh.cell_area(cell) * phi * (1.0 - phi);
-            }
-        }
-        let scale = area / volume.iter().sum::<f64>();
-        for m in 0..n {
+        let [area] = threads::sum(0..mesh.cells(), |cell| {
+            [if mesh.solid[cell] { 0.0 } else { mesh.cell_area(cell) }]
+        });
+        let [volume] = threads::sum(0..particles.len(), |p| [particles.volume[p]]);
+        let scale = area / volume;
+        for m in 0..self.materials {
+            let [projected, response] = threads::sum(0..mesh.cells(), |cell| {
+                let (phi, area) = (self.fraction(cell, m), mesh.cell_area(cell));
+                // Nothing is in a solid one.
+                [area * phi, area * phi * (1.0 - phi)]
+            });
             // Without cut cells, or with next to none, there is no rim to shift.
-            if response[m] > LEAST_RESPONSE * area {
-                let missing = (volume[m] * scale - projected[m]) / response[m];
+            if response > LEAST_RESPONSE * area {
+                let missing = (particles.volume_of(m) * scale - projected) / response;
                 let step = (VOLUME_GAIN * missing).clamp(-LARGEST_STEP, LARGEST_STEP);
                 self.factors[m] = (self.factors[m] * step.exp()).clamp(0.5, 2.0);
             }
@@ -444,7 +446,7 @@ impl CellsMut<'_> {
     /// Evaluates cell `cell`, the `k`th of these.
     fn mix(&mut self, k: usize, cell: usize, from: Ingredients, scratch: &mut Scratch) {
         let Ingredients { rule, mesh, particles, materials, content, factors } = from;
-        self.cut[k] = None;
+        let kept = self.cut[k].take();
         match content[cell] {
             Content::Uniform { material, .. } => {
                 let law = self.fill_uniform(k, material as usize, materials);
@@ -475,7 +477,13 @@ impl CellsMut<'_> {
                     // scale of the penalty layers of contrast 1e8 do not converge.
                     let arithmetic = scratch.arithmetic_viscosity(materials);
                     self.mean_viscosity[k] = cut.rest * viscosity + (1.0 - cut.rest) * arithmetic;
-                    self.cut[k] = Some(Box::new(cut));
+                    self.cut[k] = Some(match kept {
+                        Some(mut kept) => {
+                            *kept = cut;
+                            kept
+                        }
+                        None => Box::new(cut),
+                    });
                 }
             }
             Content::Solid | Content::Unknown => {}
@@ -507,14 +515,15 @@ fn content(
 /// How the materials of a cell lie.
 enum Form {
     /// Two with an interface.
-    Cut { interface: Box<Interface>, between: [usize; 2] },
+    Cut { interface: Interface, between: [usize; 2] },
     /// Drops in a material of the viscosity `around`.
     Drops { around: f64 },
     /// Unknown.
     Mixture,
 }
 
-/// Sums over the particles of one cell, by Gauss point and material.
+/// Sums over the particles of one cell, by Gauss point and material. Each thread keeps its own.
+#[derive(Default)]
 struct Scratch {
     /// Kernel-weighted volume, index `9 m + g`.
     weight: Vec<f64>,
@@ -522,21 +531,26 @@ struct Scratch {
     /// Per material.
     volume: Vec<f64>,
     log_viscosity: Vec<Fit>,
+    /// Fits of those, at the Gauss points.
+    viscosity: Vec<Option<Polynomial>>,
     /// Of all of the cell's particles, by material.
     cell_texture: Vec<Texture>,
     surroundings: Surroundings,
+    numbers: Vec<f64>,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
 impl Scratch {
-    fn new(materials: usize) -> Self {
-        Scratch {
-            weight: vec![0.0; 9 * materials],
-            texture: vec![Texture::default(); 9 * materials],
-            volume: vec![0.0; materials],
-            log_viscosity: vec![Fit::default(); materials],
-            cell_texture: vec![Texture::default(); materials],
-            surroundings: Surroundings::default(),
-        }
+    /// Makes room for a number of materials.
+    fn prepare(&mut self, materials: usize) {
+        self.weight.resize(9 * materials, 0.0);
+        self.texture.resize(9 * materials, Texture::default());
+        self.volume.resize(materials, 0.0);
+        self.log_viscosity.resize(materials, Fit::default());
+        self.cell_texture.resize(materials, Texture::default());
     }
 
     fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
@@ -632,16 +646,14 @@ impl Scratch {
             }
         }
         let stiff = viscosity[1] > viscosity[0];
-        if let Some(strip) = minority::sheet(around, stiff) {
+        if let Some(strip) = minority::sheet(around, stiff, &mut self.numbers) {
             let interface = Interface::of_sheet(&strip, stiff, mesh.cell_size(cell), share);
             if interface.trust > 0.0 {
-                return Form::Cut { interface: Box::new(interface), between };
+                return Form::Cut { interface, between };
             }
         }
         match self.surroundings.interface(share) {
-            Some(interface) if interface.trust > 0.0 => {
-                Form::Cut { interface: Box::new(interface), between }
-            }
+            Some(interface) if interface.trust > 0.0 => Form::Cut { interface, between },
             _ => Form::Mixture,
         }
     }
@@ -695,8 +707,8 @@ impl Scratch {
         factors: &[f64],
         empty: Mixture,
     ) -> (f64, f64) {
-        let viscosity_fit: Vec<_> =
-            self.log_viscosity.iter().map(|f| f.solve(Degree::Quadratic)).collect();
+        self.viscosity.clear();
+        self.viscosity.extend(self.log_viscosity.iter().map(|f| f.solve(Degree::Quadratic)));
         self.match_volumes(points, factors);
         fractions.fill(0.0);
         let (mut mean_viscosity, mut compliance) = (0.0, 0.0);
@@ -707,7 +719,7 @@ impl Scratch {
                 if phi == 0.0 {
                     continue;
                 }
-                let eta = match &viscosity_fit[m] {
+                let eta = match &self.viscosity[m] {
                     Some(fit) if material.carries_viscosity => fit.at_bounded(point.r).exp(),
                     _ => material.viscosity,
                 };

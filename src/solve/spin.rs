@@ -16,13 +16,31 @@
 use super::element::{LOCAL, Matrix, Nodal, PointShape};
 use super::quadrature::Quadrature;
 use crate::space::shape::NODES;
+use std::cell::RefCell;
 
 /// A function that is this small a part of what it was before it was made orthogonal to others is
 /// rounding.
 const LEAST_PART: f64 = 1e-10;
 
 /// The projected coupling of a cell: `sum_k b_k b_k'`.
-pub struct SpinModes(Vec<[f64; LOCAL]>);
+#[derive(Default)]
+pub struct SpinModes {
+    modes: [[f64; LOCAL]; 3],
+    /// Of those, that are there.
+    count: usize,
+}
+
+/// What modes are made in, kept by each thread.
+#[derive(Default)]
+struct Room {
+    points: Vec<Point>,
+    /// Orthonormal functions, by point.
+    basis: [Vec<f64>; 3],
+}
+
+thread_local! {
+    static ROOM: RefCell<Room> = RefCell::default();
+}
 
 /// An integration point: `4 e` times its volume, `1, xi, eta`, and `s` of unit values.
 struct Point {
@@ -35,59 +53,66 @@ impl SpinModes {
     /// Of a cell with rotation; `None` where no point has an excess.
     pub fn new(quadrature: &Quadrature, cell: usize, size: [f64; 2]) -> Option<Self> {
         let area = size[0] * size[1];
-        let mut points = Vec::new();
-        quadrature.for_points(cell, |p, shape| {
-            let excess = p.law.excess_coupling();
-            // The part of the shear viscosity of rounding is none.
-            if excess > LEAST_PART * p.law.coupling {
-                let s = PointShape::new(shape, size);
-                let mut spin = [0.0; LOCAL];
-                for a in 0..NODES {
-                    spin[a] = -0.5 * s.gy[a];
-                    spin[NODES + a] = 0.5 * s.gx[a];
-                    spin[2 * NODES + a] = -s.n[a];
+        ROOM.with_borrow_mut(|Room { points, basis }| {
+            points.clear();
+            quadrature.for_points(cell, |p, shape| {
+                let excess = p.law.excess_coupling();
+                // The part of the shear viscosity of rounding is none.
+                if excess > LEAST_PART * p.law.coupling {
+                    let s = PointShape::new(shape, size);
+                    let mut spin = [0.0; LOCAL];
+                    for a in 0..NODES {
+                        spin[a] = -0.5 * s.gy[a];
+                        spin[NODES + a] = 0.5 * s.gx[a];
+                        spin[2 * NODES + a] = -s.n[a];
+                    }
+                    let weight = 4.0 * excess * p.weight * area;
+                    points.push(Point { weight, linear: [1.0, p.r[0], p.r[1]], spin });
                 }
-                let weight = 4.0 * excess * p.weight * area;
-                points.push(Point { weight, linear: [1.0, p.r[0], p.r[1]], spin });
-            }
-        });
-        (!points.is_empty()).then(|| SpinModes::of(&points))
+            });
+            (!points.is_empty()).then(|| SpinModes::of(points, basis))
+        })
     }
 
-    fn of(points: &[Point]) -> Self {
+    /// `basis`: room.
+    fn of(points: &[Point], basis: &mut [Vec<f64>; 3]) -> Self {
         let product = |a: &[f64], b: &[f64]| -> f64 {
             points.iter().zip(a.iter().zip(b)).map(|(p, (a, b))| p.weight * a * b).sum()
         };
-        let mut basis: Vec<Vec<f64>> = Vec::with_capacity(3);
+        let mut out = SpinModes::default();
         for k in 0..3 {
-            let mut f: Vec<f64> = points.iter().map(|p| p.linear[k]).collect();
-            let before = product(&f, &f);
+            let (known, rest) = basis.split_at_mut(out.count);
+            let f = &mut rest[0];
+            f.clear();
+            f.extend(points.iter().map(|p| p.linear[k]));
+            let before = product(f, f);
             // Twice: the first pass leaves rounding of the parts it takes away.
-            for q in basis.iter().chain(&basis) {
-                let along = product(q, &f);
+            for q in known.iter().chain(&*known) {
+                let along = product(q, f);
                 f.iter_mut().zip(q).for_each(|(f, q)| *f -= along * q);
             }
-            let norm = product(&f, &f);
+            let norm = product(f, f);
             if norm > LEAST_PART * before {
                 f.iter_mut().for_each(|f| *f /= norm.sqrt());
-                basis.push(f);
+                let mode = &mut out.modes[out.count];
+                for (p, q) in points.iter().zip(&*f) {
+                    for i in 0..LOCAL {
+                        mode[i] += p.weight * q * p.spin[i];
+                    }
+                }
+                out.count += 1;
             }
         }
-        let mode = |q: &Vec<f64>| {
-            let mut b = [0.0; LOCAL];
-            for (p, q) in points.iter().zip(q) {
-                for i in 0..LOCAL {
-                    b[i] += p.weight * q * p.spin[i];
-                }
-            }
-            b
-        };
-        SpinModes(basis.iter().map(mode).collect())
+        out
+    }
+
+    fn modes(&self) -> &[[f64; LOCAL]] {
+        &self.modes[..self.count]
     }
 
     /// Adds to an element matrix, on and below the diagonal of components.
     pub fn add_stiffness(&self, k: &mut Matrix) {
-        for b in &self.0 {
+        for b in self.modes() {
             for i in 0..LOCAL {
                 for j in 0..NODES * (i / NODES + 1) {
                     k[i][j] += b[i] * b[j];
@@ -99,7 +124,7 @@ impl SpinModes {
     /// Adds to the nodal forces; the power.
     pub fn add_force<const D: usize>(&self, u: &Nodal<D>, force: &mut Nodal<D>) -> f64 {
         let mut power = 0.0;
-        for b in &self.0 {
+        for b in self.modes() {
             let along: f64 = (0..NODES * D).map(|i| b[i] * u[i % NODES][i / NODES]).sum();
             power += along * along;
             for i in 0..NODES * D {
@@ -134,7 +159,7 @@ mod tests {
     #[test]
     fn a_linear_relative_spin_keeps_all_its_power() {
         let points = points(|g| 0.3 + 0.1 * g as f64);
-        let modes = SpinModes::of(&points);
+        let modes = SpinModes::of(&points, &mut Default::default());
         // u = -y^2, w = 0.4 x: spin y, relative spin y - 0.4 x
         let u: Nodal<3> = std::array::from_fn(|a| {
             let (x, y) = ((a % 3) as f64 * 0.5 * SIZE[0], (a / 3) as f64 * 0.5 * SIZE[1]);
@@ -155,8 +180,9 @@ mod tests {
     fn points_without_weight_leave_fewer_functions() {
         // One column of points tells nothing about slopes along x.
         let column = points(|_| 1.0).into_iter().skip(1).step_by(3).collect::<Vec<_>>();
-        assert_eq!(SpinModes::of(&column).0.len(), 2);
-        assert_eq!(SpinModes::of(&column[..1]).0.len(), 1);
-        assert_eq!(SpinModes::of(&points(|g| 10f64.powi(-(g as i32)))).0.len(), 3);
+        let count = |points: &[Point]| SpinModes::of(points, &mut Default::default()).count;
+        assert_eq!(count(&column), 2);
+        assert_eq!(count(&column[..1]), 1);
+        assert_eq!(count(&points(|g| 10f64.powi(-(g as i32)))), 3);
     }
 }

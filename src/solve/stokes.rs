@@ -26,7 +26,7 @@
 //! the latter, and a few more corrections bring it down to rounding.
 
 use super::buoyancy::{Restoring, SIDE_NODES};
-use super::element::{Divergence, Internal, Nodal, SKELETON_NODES, pressure_mass};
+use super::element::{Divergence, Internal, Nodal, SKELETON_NODES, TOGETHER, pressure_mass};
 use super::matrices::{Ingredients, Matrices};
 use super::multifrontal::tree::{NO_POSITION, Tree};
 use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
@@ -38,6 +38,7 @@ use crate::space::incidence::Incidence;
 use crate::space::mesh::Mesh;
 use crate::space::shape::{CENTRE, NODES};
 use crate::threads;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -150,8 +151,9 @@ pub struct Stokes<const D: usize> {
     constraints: Constraints<D>,
     matrices: Matrices<D>,
     factor: Multifrontal<D>,
-    /// Unaugmented diagonal, per node.
+    /// Unaugmented diagonal, per node, and one over it.
     diagonal: Vec<[f64; D]>,
+    inverse_diagonal: Vec<[f64; D]>,
     simd: Simd,
     work: Work<D>,
 }
@@ -261,6 +263,7 @@ impl<const D: usize> Stokes<D> {
             matrices: Matrices::new(mesh.cells()),
             factor: Multifrontal::new(tree, mesh.cells()),
             diagonal: vec![[0.0; D]; mesh.nodes()],
+            inverse_diagonal: vec![[0.0; D]; mesh.nodes()],
             simd: Simd::used(),
             work: Work::default(),
             mesh,
@@ -360,11 +363,23 @@ impl<const D: usize> Stokes<D> {
 
     /// Element matrices of the cells that changed; number of active rotation unknowns.
     fn assemble(&mut self, quadrature: &Quadrature, restoring: &Restoring) -> usize {
-        let Stokes { mesh, incidence, constraints, matrices, factor, diagonal, .. } = self;
+        let Stokes {
+            mesh,
+            incidence,
+            constraints,
+            matrices,
+            factor,
+            diagonal,
+            inverse_diagonal,
+            ..
+        } = self;
         let from = Ingredients { mesh, incidence, constraints, quadrature, restoring };
         matrices.update(from, |cell| factor.touch(cell));
         diagonal.fill([0.0; D]);
         incidence.add_up(diagonal, |cell, a| matrices.cells[cell].diagonal[a]);
+        threads::for_each(inverse_diagonal, NODE_GRAIN, |node, inverse| {
+            *inverse = diagonal[node].map(|d| 1.0 / d);
+        });
         if D == 3 { diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
     }
 
@@ -376,12 +391,15 @@ impl<const D: usize> Stokes<D> {
         work: &mut Work<D>,
     ) {
         let Work { residual: out, shares, .. } = work;
-        shares.resize(self.mesh.cells(), Share::default());
-        threads::for_each(shares, CELL_GRAIN, |cell, share| {
-            if !self.mesh.solid[cell] {
-                self.cell_residual(cell, quadrature, restoring, flow, share);
-            }
+        let cells = self.mesh.cells();
+        // Whole blocks; what is beyond the last cell stays zero.
+        shares.resize(cells.next_multiple_of(TOGETHER), Share::default());
+        let (blocks, _) = shares.as_chunks_mut::<TOGETHER>();
+        threads::for_each(blocks, CELL_GRAIN / TOGETHER, |block, shares| {
+            let first = block * TOGETHER;
+            self.residuals(first..cells.min(first + TOGETHER), quadrature, restoring, flow, shares);
         });
+        let shares = &shares[..cells];
         let sums = threads::sum(0..shares.len(), |cell| shares[cell].sums);
         [out.dissipation, out.strain, out.divergence_norm, out.restoring, ..] = sums;
         [.., out.pressure_norm, out.yielding, out.pressure_square] = sums;
@@ -404,9 +422,31 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
+    /// Of some cells that are computed together.
+    fn residuals(
+        &self,
+        cells: Range<usize>,
+        quadrature: &Quadrature,
+        restoring: &Restoring,
+        flow: &Flow<D>,
+        shares: &mut [Share<D>; TOGETHER],
+    ) {
+        let spin = &self.matrices.spin;
+        let internal = Internal::of_cells(self.simd, quadrature, spin, cells.clone(), |cell| {
+            let u = self.incidence.nodes[cell].map(|n| flow.velocity[n]);
+            (!self.mesh.solid[cell]).then(|| (self.mesh.cell_size(cell), u))
+        });
+        for (cell, (share, internal)) in cells.zip(shares.iter_mut().zip(&internal)) {
+            if !self.mesh.solid[cell] {
+                self.cell_residual(cell, internal, quadrature, restoring, flow, share);
+            }
+        }
+    }
+
     fn cell_residual(
         &self,
         cell: usize,
+        internal: &Internal<D>,
         quadrature: &Quadrature,
         restoring: &Restoring,
         flow: &Flow<D>,
@@ -415,7 +455,6 @@ impl<const D: usize> Stokes<D> {
         let nodes = &self.incidence.nodes[cell];
         let size = self.mesh.cell_size(cell);
         let u = nodes.map(|n| flow.velocity[n]);
-        let internal = Internal::new(self.simd, quadrature, cell, size, &u);
         let divergence = Divergence::new(size);
         let mass = pressure_mass(size[0] * size[1]);
         let pressure = flow.pressure[cell];
@@ -425,7 +464,7 @@ impl<const D: usize> Stokes<D> {
         let mut pressure_norm = 0.0;
         for (a, &node) in nodes.iter().enumerate() {
             for c in 0..2 {
-                pressure_norm += force[a][c] * force[a][c] / self.diagonal[node][c];
+                pressure_norm += force[a][c] * force[a][c] * self.inverse_diagonal[node][c];
             }
         }
         let bu = divergence.apply(&u);
@@ -471,8 +510,9 @@ impl<const D: usize> Stokes<D> {
                 }
                 sums[2] += d * flow.velocity[node][c].powi(2);
                 if !self.constraints.is_fixed(node, c) {
-                    sums[0] += r.force[node][c].powi(2) / d;
-                    sums[1] += load[node][c].powi(2) / d;
+                    let inverse = self.inverse_diagonal[node][c];
+                    sums[0] += r.force[node][c].powi(2) * inverse;
+                    sums[1] += load[node][c].powi(2) * inverse;
                 }
             }
             sums
@@ -514,6 +554,7 @@ impl<const D: usize> Stokes<D> {
             (0..D).filter(|&c| constraints.is_fixed(node, c)).for_each(|c| force[c] = 0.0);
             force
         };
+        let shares = &mut shares[..mesh.cells()];
         // Right-hand side of each cell, its centre condensed; there the whole force.
         threads::for_each(shares, CELL_GRAIN, |cell, share| {
             if mesh.solid[cell] {

@@ -92,21 +92,26 @@ impl Weight {
         }
     }
 
-    /// Mean density of each cell.
-    pub fn means(&self) -> Vec<f64> {
-        let mean = |d: &[f64; 9]| d.iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum();
-        self.at_gauss.iter().map(mean).collect()
+    /// Mean density of a cell.
+    pub fn mean(&self, cell: usize) -> f64 {
+        self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum()
     }
 
-    /// Gradient of the density inside each cell, in its reference coordinates.
-    pub fn slopes(&self) -> Vec<[f64; 2]> {
-        let slope = |d: &[f64; 9]| {
-            let part = |c: usize| -> f64 {
-                d.iter().zip(GAUSS_3X3.iter()).map(|(d, g)| 3.0 * d * g.weight * g.r[c]).sum()
-            };
-            [part(0), part(1)]
-        };
-        self.at_gauss.iter().map(slope).collect()
+    /// Gradient of the density inside a cell, in its reference coordinates.
+    pub fn slope(&self, cell: usize) -> [f64; 2] {
+        let points = || self.at_gauss[cell].iter().zip(GAUSS_3X3.iter());
+        [0, 1].map(|c| points().map(|(d, g)| 3.0 * d * g.weight * g.r[c]).sum())
+    }
+
+    /// `integral density N` over the cell's area.
+    pub fn nodal_masses(&self, cell: usize) -> [f64; 9] {
+        let mut mass = [0.0; 9];
+        for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
+            for (mass, n) in mass.iter_mut().zip(&g.shape.n) {
+                *mass += g.weight * density * n;
+            }
+        }
+        mass
     }
 
     /// Mass at each Gauss point as a share of the cell's area, reference coordinates, shape

@@ -2,10 +2,11 @@
 
 use super::mesh::Mesh;
 use super::shape::{GAUSS_3X3, NODES, Shape};
+use crate::threads;
 use nalgebra::Matrix2;
 
 /// Velocity (and rotation) at the mesh's nodes, pressure in its cells.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Flow<const D: usize> {
     /// `u, v` (and `w`) per node.
     pub velocity: Vec<[f64; D]>,
@@ -44,9 +45,16 @@ impl<const D: usize> Flow<D> {
         pressure.zip(earlier.pressure.as_flattened()).for_each(|(now, before)| go_on(now, before));
     }
 
+    /// Becomes another flow, in the room that it has.
+    pub fn copy_from(&mut self, other: &Flow<D>) {
+        self.velocity.clone_from(&other.velocity);
+        self.pressure.clone_from(&other.pressure);
+    }
+
     /// The velocity alone, for what moves with it.
-    pub fn translation(&self) -> Vec<[f64; 2]> {
-        self.velocity.iter().map(|u| [u[0], u[1]]).collect()
+    pub fn translation(&self, out: &mut Vec<[f64; 2]>) {
+        out.clear();
+        out.extend(self.velocity.iter().map(|u| [u[0], u[1]]));
     }
 
     pub fn max_speed(&self) -> f64 {
@@ -55,16 +63,18 @@ impl<const D: usize> Flow<D> {
 
     /// Root mean square of the speed over all cells that are not solid.
     pub fn rms_speed(&self, mesh: &Mesh) -> f64 {
-        let (mut sum, mut area) = (0.0, 0.0);
-        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let [sum, area] = threads::sum(0..mesh.cells(), |cell| {
+            if mesh.solid[cell] {
+                return [0.0; 2];
+            }
             let nodal = self.of_cell(mesh, cell);
             let squares = GAUSS_3X3.iter().map(|g| {
                 let u = interpolate(&nodal, &g.shape.n);
                 g.weight * (u[0] * u[0] + u[1] * u[1])
             });
-            sum += mesh.cell_area(cell) * squares.sum::<f64>();
-            area += mesh.cell_area(cell);
-        }
+            let area = mesh.cell_area(cell);
+            [area * squares.sum::<f64>(), area]
+        });
         (sum / area).sqrt()
     }
 }

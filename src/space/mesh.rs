@@ -7,11 +7,27 @@ pub const ON_LINE: f64 = 1e-10;
 /// Points so far inside a cell, in half cells, are in it whatever rounding does.
 pub const INSIDE: f64 = 1.0 - 1e-9;
 
+/// A cell along one direction.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Span {
+    pub centre: f64,
+    /// Reference coordinates per length.
+    pub per_length: f64,
+}
+
+impl Span {
+    /// Reference coordinate: -1 to 1 inside.
+    pub fn reference(&self, x: f64) -> f64 {
+        (x - self.centre) * self.per_length
+    }
+}
+
 /// Mesh lines along one direction, ascending; a periodic axis joins its last line to its first.
 #[derive(Clone, Debug)]
 pub struct Axis {
     lines: Vec<f64>,
     periodic: bool,
+    spans: Vec<Span>,
     /// For uniform bins over the axis, the cell at the bin's start.
     bins: Vec<u32>,
     bins_per_length: f64,
@@ -33,7 +49,11 @@ impl Axis {
             }
             bins.push(cell as u32);
         }
-        Axis { lines, periodic, bins, bins_per_length }
+        let spans = lines
+            .windows(2)
+            .map(|w| Span { centre: 0.5 * (w[0] + w[1]), per_length: 2.0 / (w[1] - w[0]) })
+            .collect();
+        Axis { lines, periodic, spans, bins, bins_per_length }
     }
 
     pub fn lines(&self) -> &[f64] {
@@ -57,6 +77,9 @@ impl Axis {
     /// Nodes of the quadratic element: mesh lines and midpoints.
     pub fn nodes(&self) -> usize {
         2 * self.cells() + usize::from(!self.periodic)
+    }
+    pub fn span(&self, cell: usize) -> Span {
+        self.spans[cell]
     }
     pub fn size(&self, cell: usize) -> f64 {
         self.lines[cell + 1] - self.lines[cell]

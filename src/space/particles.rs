@@ -1,7 +1,7 @@
 //! Particles: structure of arrays, kept sorted by cell. Columns that no effect needs are absent.
 
 use super::mesh::Mesh;
-use crate::threads;
+use crate::threads::{self, Divisible};
 
 /// A column that exists only when an effect calls for it.
 pub type Column<T> = Option<Vec<T>>;
@@ -30,12 +30,18 @@ pub struct Particles {
 /// Particles that are worth a task of their own.
 const GRAIN: usize = 4096;
 
+/// The cell of a particle that is to be taken away.
+pub const GONE: u32 = u32::MAX;
+
 /// Room that sorting takes, kept from one time to the next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sorting {
     cells: Vec<u32>,
     next: Vec<u32>,
     order: Vec<u32>,
+    /// Particles that change their cell, in their order; then by the cell they come to.
+    leaving: Vec<u32>,
+    arriving: Vec<u32>,
     pairs: Vec<[f64; 2]>,
     numbers: Vec<f64>,
     bytes: Vec<u8>,
@@ -45,16 +51,34 @@ pub(crate) struct Sorting {
 impl Sorting {
     /// Brings a column into the new order.
     fn permute<T: Sortable>(&mut self, column: &mut Vec<T>) {
+        let Some(&any) = column.first() else { return };
         let mut room = std::mem::take(T::room(self));
-        room.clear();
-        room.extend(self.order.iter().map(|&p| column[p as usize]));
+        room.resize(self.order.len(), any);
+        let (order, from) = (&self.order, &*column);
+        threads::for_each(&mut room, GRAIN, |k, value| *value = from[order[k] as usize]);
         std::mem::swap(column, &mut room);
         *T::room(self) = room;
     }
 }
 
+/// Places in the new order of the particles of some consecutive cells.
+struct Places<'a> {
+    /// First place of each of these cells and of the next.
+    start: &'a [u32],
+    order: &'a mut [u32],
+}
+
+impl Divisible for Places<'_> {
+    fn cut(self, at: usize) -> (Self, Self) {
+        let places = (self.start[at] - self.start[0]) as usize;
+        let (a, b) = self.order.split_at_mut(places);
+        let (before, after) = (&self.start[..=at], &self.start[at..]);
+        (Places { start: before, order: a }, Places { start: after, order: b })
+    }
+}
+
 /// What a column can hold.
-trait Sortable: Copy {
+trait Sortable: Copy + Send + Sync {
     fn room(sorting: &mut Sorting) -> &mut Vec<Self>;
 }
 
@@ -141,11 +165,78 @@ impl Particles {
         self.sort_by_cells(mesh.cells());
     }
 
-    /// The same for `count` cells where each particle's is known.
-    pub fn sort_into(&mut self, count: usize, cells: impl Iterator<Item = u32>) {
-        self.sorting.cells.clear();
-        self.sorting.cells.extend(cells);
-        self.sort_by_cells(count);
+    /// Sorts particles that were sorted and then moved into `cells`, and takes away those that are
+    /// [`GONE`]: the same order as [`Particles::sort`] finds, from those alone that changed.
+    pub fn regroup(&mut self, cells: &[u32]) {
+        /// Cells that are worth a task of their own.
+        const CELL_GRAIN: usize = 512;
+        let count = self.cell_start.len() - 1;
+        let mut sorting = std::mem::take(&mut self.sorting);
+        let mut start = std::mem::take(&mut sorting.cells);
+        let Sorting { next, order, leaving, arriving, .. } = &mut sorting;
+        leaving.clear();
+        // Few leave, but how many differs from step to step.
+        leaving.reserve(cells.len());
+        arriving.reserve(cells.len());
+        for cell in 0..count {
+            let range = self.of_cell(cell);
+            let away = cells[range.clone()].iter().zip(range).filter(|c| *c.0 != cell as u32);
+            leaving.extend(away.map(|c| c.1 as u32));
+        }
+        if leaving.is_empty() {
+            sorting.cells = start;
+            self.sorting = sorting;
+            return;
+        }
+        let to = |p: u32| Some(cells[p as usize]).filter(|&c| c != GONE).map(|c| c as usize);
+        // First by cell those that arrive: `next[c]` is where those of a cell begin, then where
+        // they end.
+        next.clear();
+        next.resize(count + 1, 0);
+        leaving.iter().filter_map(|&p| to(p)).for_each(|c| next[c + 1] += 1);
+        // Where each cell will begin: what it had, less what leaves, and what arrives.
+        let old = &self.cell_start;
+        start.clear();
+        start.push(0);
+        let (mut left, mut total) = (leaving.iter().peekable(), 0);
+        for cell in 0..count {
+            total += old[cell + 1] - old[cell] + next[cell + 1];
+            while left.next_if(|&&p| p < old[cell + 1]).is_some() {
+                total -= 1;
+            }
+            start.push(total);
+            next[cell + 1] += next[cell];
+        }
+        arriving.resize(next[count] as usize, 0);
+        for &p in &*leaving {
+            if let Some(c) = to(p) {
+                arriving[next[c] as usize] = p;
+                next[c] += 1;
+            }
+        }
+        order.resize(total as usize, 0);
+        let places = Places { start: &start, order };
+        threads::for_parts(places, 0..count, CELL_GRAIN, |part, places| {
+            let mut at = places.order.iter_mut();
+            let mut put = |p: u32| {
+                if let Some(place) = at.next() {
+                    *place = p;
+                }
+            };
+            for cell in part {
+                let begin = if cell == 0 { 0 } else { next[cell - 1] };
+                let guests = &arriving[begin as usize..next[cell] as usize];
+                // In the order of all: those from cells before this one come first.
+                let before = guests.partition_point(|&p| p < old[cell]);
+                guests[..before].iter().for_each(|&p| put(p));
+                let own = old[cell]..old[cell + 1];
+                own.filter(|&p| cells[p as usize] == cell as u32).for_each(&mut put);
+                guests[before..].iter().for_each(|&p| put(p));
+            }
+        });
+        sorting.cells = std::mem::replace(&mut self.cell_start, start);
+        for_columns!(&mut *self, |c| sorting.permute(c));
+        self.sorting = sorting;
     }
 
     fn sort_by_cells(&mut self, count: usize) {
@@ -172,12 +263,60 @@ impl Particles {
         self.sorting = sorting;
     }
 
-    /// Total volume of each of `materials` materials.
-    pub fn volumes(&self, materials: usize) -> Vec<f64> {
-        let mut total = vec![0.0; materials];
-        for (m, v) in self.material.iter().zip(&self.volume) {
-            total[*m as usize] += v;
-        }
+    /// Total volume of a material.
+    pub fn volume_of(&self, material: usize) -> f64 {
+        let [total] = threads::sum(0..self.len(), |p| {
+            [if usize::from(self.material[p]) == material { self.volume[p] } else { 0.0 }]
+        });
         total
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::Axis;
+    use super::*;
+
+    #[test]
+    fn regrouping_finds_the_order_of_sorting() {
+        let lines: Vec<f64> = (0..=6).map(f64::from).collect();
+        let mesh = Mesh::new(Axis::new(lines.clone(), false), Axis::new(lines, false));
+        let number = |k: usize, s: f64| (s * (k as f64 + 1.0)).sin().abs();
+        let mut particles = Particles {
+            position: (0..400).map(|k| [6.0 * number(k, 12.9), 6.0 * number(k, 78.2)]).collect(),
+            volume: (0..400).map(|k| k as f64).collect(),
+            material: (0..400).map(|k| (k % 3) as u8).collect(),
+            mark: Some((0..400).map(|k| k % 7 == 0).collect()),
+            ..Particles::default()
+        };
+        particles.sort(&mesh);
+        for step in 0..6 {
+            // None, few, and nearly all move; some go.
+            let reach = [0.0, 0.02, 0.3, 5.0, 0.3, 0.1][step];
+            let gone: Vec<bool> =
+                (0..particles.len()).map(|k| step > 2 && (k + step) % 29 == 0).collect();
+            for (k, p) in particles.position.iter_mut().enumerate() {
+                *p = [0, 1].map(|c| {
+                    let way = reach * (number(k + 31 * step, 7.1 + c as f64) - 0.5);
+                    (p[c] + way).clamp(0.0, 6.0)
+                });
+            }
+            let cells: Vec<u32> = particles
+                .position
+                .iter()
+                .zip(&gone)
+                .map(|(p, &gone)| if gone { GONE } else { mesh.locate(*p) as u32 })
+                .collect();
+            let mut expected = particles.clone();
+            expected.remove(&gone);
+            expected.sort(&mesh);
+            particles.regroup(&cells);
+            assert_eq!(particles.cell_start, expected.cell_start);
+            assert_eq!(particles.position, expected.position);
+            assert_eq!(particles.volume, expected.volume);
+            assert_eq!(particles.material, expected.material);
+            assert_eq!(particles.mark, expected.mark);
+        }
+        assert!(particles.len() < 390);
     }
 }

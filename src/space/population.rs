@@ -48,15 +48,29 @@ pub struct Count {
 pub struct Population {
     seeding: Seeding,
     neighbours: Neighbours,
+    room: Room,
+}
+
+/// Room that is kept from step to step.
+#[derive(Clone, Debug, Default)]
+struct Room {
+    /// Cells that lack particles.
+    lacking: Vec<bool>,
+    /// Particles of a cell, and those of one kind.
+    members: Vec<usize>,
+    kin: Vec<usize>,
+    /// Their reference coordinates.
+    places: Vec<[f64; 2]>,
 }
 
 impl Population {
     pub fn new(mesh: &Mesh, enclosure: &Enclosure, seeding: Seeding) -> Self {
-        Population { seeding, neighbours: Neighbours::new(mesh, enclosure) }
+        let room = Room { lacking: vec![false; mesh.cells()], ..Room::default() };
+        Population { seeding, neighbours: Neighbours::new(mesh, enclosure), room }
     }
 
     /// Restores the bounds. `particles` must be sorted, and are sorted on return.
-    pub fn control(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
+    pub fn control(&mut self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
         self.merge(mesh, particles, count);
         self.split(mesh, particles, count);
     }
@@ -65,34 +79,39 @@ impl Population {
         self.seeding.count()
     }
 
-    fn split(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
+    fn split(&mut self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
         let before = particles.len();
         let least = (self.target() / 2).max(1);
-        let mut lacking = vec![false; mesh.cells()];
-        threads::for_each(&mut lacking, GRAIN, |cell, lacks| {
+        let mut room = std::mem::take(&mut self.room);
+        let Room { lacking, members, kin, places } = &mut room;
+        threads::for_each(lacking, GRAIN, |cell, lacks| {
             *lacks = self.lacks(mesh, particles, cell, least);
         });
         for cell in (0..mesh.cells()).filter(|&c| lacking[c]) {
-            let mut members: Vec<usize> = particles.of_cell(cell).collect();
+            members.clear();
+            members.extend(particles.of_cell(cell));
             let nominal = mesh.cell_area(cell) / self.target() as f64;
-            while let Some(gap) = self.gap(mesh, particles, cell, &members, least) {
-                let parent = nearest(mesh, particles, cell, &members, gap, SPLIT * nominal);
+            loop {
+                let place = |&p: &usize| mesh.to_reference(cell, particles.position[p]);
+                places.clear();
+                places.extend(members.iter().map(place));
+                let Some(gap) = self.gap(mesh, cell, places, least) else { break };
+                let parent = nearest(mesh, particles, cell, members, gap, SPLIT * nominal);
                 particles.volume[parent] *= 0.5;
                 particles.duplicate(parent);
                 let child = particles.len() - 1;
                 members.push(child);
-                let kin: Vec<usize> = members
-                    .iter()
-                    .copied()
-                    .filter(|&p| particles.material[p] == particles.material[child])
-                    .collect();
-                let fields = CarriedFields::new(mesh, particles, cell, &kin);
+                let kind = particles.material[child];
+                kin.clear();
+                kin.extend(members.iter().filter(|&&p| particles.material[p] == kind));
+                let fields = CarriedFields::new(mesh, particles, cell, kin, places);
                 particles.position[child] = mesh.from_reference(cell, gap);
-                keep_centroid(mesh, particles, cell, &kin, (parent, child));
-                fields.follow(mesh, particles, cell, &kin);
+                keep_centroid(mesh, particles, cell, kin, (parent, child));
+                fields.follow(mesh, particles, cell, kin);
                 count.splits += 1;
             }
         }
+        self.room = room;
         if particles.len() != before {
             particles.sort(mesh);
         }
@@ -134,16 +153,7 @@ impl Population {
 
     /// A place (reference coordinates) that lacks a particle: in an empty quadrant, or, where
     /// the cell has too few, the lattice point farthest from all.
-    fn gap(
-        &self,
-        mesh: &Mesh,
-        particles: &Particles,
-        cell: usize,
-        members: &[usize],
-        least: usize,
-    ) -> Option<[f64; 2]> {
-        let places: Vec<[f64; 2]> =
-            members.iter().map(|&p| mesh.to_reference(cell, particles.position[p])).collect();
+    fn gap(&self, mesh: &Mesh, cell: usize, places: &[[f64; 2]], least: usize) -> Option<[f64; 2]> {
         if self.target() >= 4 {
             let empty = (0..4).map(quadrant).filter(|c| !places.iter().any(|r| holds(c, r)));
             let first =
@@ -152,7 +162,7 @@ impl Population {
                 return first;
             }
         }
-        if members.len() >= least {
+        if places.len() >= least {
             return None;
         }
         let lattice = (0..16).map(|k| [-0.75 + 0.5 * (k % 4) as f64, -0.75 + 0.5 * (k / 4) as f64]);
@@ -185,8 +195,7 @@ impl Population {
 
     fn merge(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
         let most = 2 * self.target() + 4;
-        let mut gone = vec![false; particles.len()];
-        let mut any = false;
+        let mut gone = Vec::new();
         for cell in 0..mesh.cells() {
             if particles.of_cell(cell).len() <= most {
                 continue;
@@ -195,13 +204,13 @@ impl Population {
             while members.len() > most {
                 let Some((a, b)) = closest_pair(mesh, particles, cell, &members) else { break };
                 particles.absorb(a, b);
+                gone.resize(particles.len(), false);
                 gone[b] = true;
-                any = true;
                 members.retain(|&p| p != b);
                 count.merges += 1;
             }
         }
-        if any {
+        if !gone.is_empty() {
             particles.remove(&gone);
             particles.sort(mesh);
         }
@@ -262,20 +271,27 @@ fn keep_centroid(
 /// Fields that particles of one kind carry in a cell, as polynomials: particles that are moved
 /// without flow take the field's difference between their places with them. Without it, a
 /// child has its parent's density at a place where the density is another, a first-order error.
-struct CarriedFields {
+struct CarriedFields<'a> {
     density: Option<Polynomial>,
     log_viscosity: Option<Polynomial>,
     /// Where they were, in reference coordinates.
-    places: Vec<[f64; 2]>,
+    places: &'a [[f64; 2]],
 }
 
-impl CarriedFields {
-    fn new(mesh: &Mesh, particles: &Particles, cell: usize, kin: &[usize]) -> Self {
-        let places: Vec<_> =
-            kin.iter().map(|&p| mesh.to_reference(cell, particles.position[p])).collect();
+impl<'a> CarriedFields<'a> {
+    /// `places`: room.
+    fn new(
+        mesh: &Mesh,
+        particles: &Particles,
+        cell: usize,
+        kin: &[usize],
+        places: &'a mut Vec<[f64; 2]>,
+    ) -> Self {
+        places.clear();
+        places.extend(kin.iter().map(|&p| mesh.to_reference(cell, particles.position[p])));
         let fit = |value: &dyn Fn(usize) -> f64| {
             let mut fit = Fit::default();
-            for (&p, &r) in kin.iter().zip(&places) {
+            for (&p, &r) in kin.iter().zip(&*places) {
                 fit.add(particles.volume[p], r, value(p));
             }
             fit.solve(Degree::Quadratic)
@@ -288,7 +304,7 @@ impl CarriedFields {
     }
 
     fn follow(&self, mesh: &Mesh, particles: &mut Particles, cell: usize, kin: &[usize]) {
-        for (&p, &before) in kin.iter().zip(&self.places) {
+        for (&p, &before) in kin.iter().zip(self.places) {
             let now = mesh.to_reference(cell, particles.position[p]);
             let change = |f: &Polynomial| f.at_bounded(now) - f.at_bounded(before);
             if let (Some(column), Some(f)) = (&mut particles.density, &self.density) {

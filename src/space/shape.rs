@@ -94,38 +94,30 @@ pub static GAUSS_6X6: LazyLock<[GaussPoint; SUBPOINTS]> = LazyLock::new(|| {
     })
 });
 
-/// The nine shape functions at the nine points of [`GAUSS_3X3`], as plain tables: loops over
-/// either index vectorise. By `[node][point]` they interpolate, by `[point][node]` they test.
-pub struct Table {
-    pub by_node: [[f64; 9]; NODES],
-    pub by_point: [[f64; NODES]; 9],
-}
+/// Something of the nine shape functions at the nine points of [`GAUSS_3X3`], `[point][node]`.
+pub type Table = [[f64; NODES]; 9];
 
-impl Table {
-    /// `x` and `y`: the factors in either direction, by `[Gauss abscissa][node]`.
-    const fn product(x: &[[f64; 3]; 3], y: &[[f64; 3]; 3]) -> Self {
-        let mut t = Table { by_node: [[0.0; 9]; NODES], by_point: [[0.0; NODES]; 9] };
-        let mut k = 0;
-        while k < 81 {
-            let (g, a) = (k / 9, k % 9);
-            let value = x[g % 3][a % 3] * y[g / 3][a / 3];
-            t.by_node[a][g] = value;
-            t.by_point[g][a] = value;
-            k += 1;
-        }
-        t
+/// `x` and `y`: the factors in either direction, by `[Gauss abscissa][node]`.
+const fn product(x: &[[f64; 3]; 3], y: &[[f64; 3]; 3]) -> Table {
+    let mut t = [[0.0; NODES]; 9];
+    let mut k = 0;
+    while k < 81 {
+        let (g, a) = (k / 9, k % 9);
+        t[g][a] = x[g % 3][a % 3] * y[g / 3][a / 3];
+        k += 1;
     }
+    t
 }
 
 const AT_GAUSS: [([f64; 3], [f64; 3]); 3] =
     [quadratic(GAUSS_3[0]), quadratic(GAUSS_3[1]), quadratic(GAUSS_3[2])];
-const VALUES: [[f64; 3]; 3] = [AT_GAUSS[0].0, AT_GAUSS[1].0, AT_GAUSS[2].0];
-const SLOPES: [[f64; 3]; 3] = [AT_GAUSS[0].1, AT_GAUSS[1].1, AT_GAUSS[2].1];
-/// Values at the Gauss points.
-pub static N_AT_GAUSS: Table = Table::product(&VALUES, &VALUES);
+/// The quadratic functions of one direction at the three points of [`GAUSS_3`], `[point][node]`.
+pub const VALUES_AT_GAUSS: [[f64; 3]; 3] = [AT_GAUSS[0].0, AT_GAUSS[1].0, AT_GAUSS[2].0];
+/// Their derivatives.
+pub const SLOPES_AT_GAUSS: [[f64; 3]; 3] = [AT_GAUSS[0].1, AT_GAUSS[1].1, AT_GAUSS[2].1];
 /// Reference derivatives at the Gauss points.
-pub static D_XI_AT_GAUSS: Table = Table::product(&SLOPES, &VALUES);
-pub static D_ETA_AT_GAUSS: Table = Table::product(&VALUES, &SLOPES);
+pub static D_XI_AT_GAUSS: Table = product(&SLOPES_AT_GAUSS, &VALUES_AT_GAUSS);
+pub static D_ETA_AT_GAUSS: Table = product(&VALUES_AT_GAUSS, &SLOPES_AT_GAUSS);
 
 /// Five-point Gauss rule `(abscissa, weight)` on `[-1, 1]`, weights adding up to 1: for loads and
 /// error norms, where 3 x 3 would be the error.
@@ -158,12 +150,8 @@ mod tests {
     #[test]
     fn tables_hold_the_shape_functions_at_the_gauss_points() {
         for (p, g) in GAUSS_3X3.iter().enumerate() {
-            assert_eq!(N_AT_GAUSS.by_point[p], g.shape.n);
-            assert_eq!(D_XI_AT_GAUSS.by_point[p], g.shape.d_xi);
-            assert_eq!(D_ETA_AT_GAUSS.by_point[p], g.shape.d_eta);
-            for a in 0..NODES {
-                assert_eq!(D_XI_AT_GAUSS.by_node[a][p], g.shape.d_xi[a]);
-            }
+            assert_eq!(D_XI_AT_GAUSS[p], g.shape.d_xi);
+            assert_eq!(D_ETA_AT_GAUSS[p], g.shape.d_eta);
         }
     }
 

@@ -18,10 +18,17 @@ fn stores(path: &Path) -> Vec<ChunkStore> {
 
 /// The recording of a file that has one, and a blueprint.
 pub fn recording(path: &Path) -> ChunkStore {
+    let (recording, blueprints) = begun_recording(path);
+    assert_eq!(blueprints, 1);
+    recording
+}
+
+/// The recording of a file that has one, and its number of blueprints.
+pub fn begun_recording(path: &Path) -> (ChunkStore, usize) {
     let (mut recordings, blueprints): (Vec<_>, Vec<_>) =
         stores(path).into_iter().partition(|store| store.id().kind() == StoreKind::Recording);
-    assert_eq!((recordings.len(), blueprints.len()), (1, 1));
-    recordings.remove(0)
+    assert_eq!(recordings.len(), 1);
+    (recordings.remove(0), blueprints.len())
 }
 
 /// Steps of the run, in order.

@@ -67,7 +67,7 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
     assert!(energy_error(run.as_ref(), first).abs() < 0.01);
     // Particles stay inside, and their volumes add up to the grains'.
     let plan = run.plan();
-    let total: f64 = run.particles().volumes(2)[0] * plan.units.area();
+    let total: f64 = run.particles().volume_of(0) * plan.units.area();
     assert!((total / 16.0 - 1.0).abs() < 1e-12, "{total}");
     for p in &run.particles().position {
         let [x, y] = plan.si(*p);

@@ -1,7 +1,7 @@
 //! Transport and directors are of second order in the time step.
 
 use crate::{finish, preset, scene};
-use grainscope::motion::carrier::{Carrier, Home};
+use grainscope::motion::carrier::{Carrier, Currents};
 use grainscope::sim::Run;
 use grainscope::space::mesh::{Axis, Mesh};
 use grainscope::space::walls::Enclosure;
@@ -38,14 +38,16 @@ fn points_and_directors_in_a_steady_vortex() {
         .collect();
     let enclosure = Enclosure::default();
     let moved = |steps: u32| {
-        let carrier = Carrier::new(&mesh, &enclosure, &velocity, 1.0 / f64::from(steps));
+        let mut currents = Currents::new(&mesh, &enclosure);
+        let dt = 1.0 / f64::from(steps);
+        let carrier = Carrier::new(&mesh, &enclosure, &mut currents, &velocity, dt);
         let mut places = Vec::new();
         let mut directors = Vec::new();
         for k in 0..60 {
             let mut p = [0.05 + 0.9 * (f64::from(k) * 0.618).fract(), 0.06 + 0.015 * f64::from(k)];
             let mut n = [f64::from(k).cos(), f64::from(k).sin()];
             for _ in 0..steps {
-                let journey = carrier.travel(&Home::new(&mesh, mesh.locate(p)), p);
+                let journey = carrier.travel(&carrier.home(mesh.locate(p)), p);
                 n = carrier.turn(n, &carrier.gradient(journey.middle));
                 p = journey.to;
             }

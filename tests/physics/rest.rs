@@ -87,7 +87,7 @@ fn volume(region: &str, placement: &str) -> f64 {
     );
     let run = scene(&text, &[]);
     let total: f64 = run.particles().volume.iter().sum();
-    run.particles().volumes(2)[1] / total
+    run.particles().volume_of(1) / total
 }
 
 #[test]

@@ -61,6 +61,14 @@ fn column_start(rim: usize, j: usize) -> usize {
     block_start(rim, k) + within * (rim - k * BLOCK) + within
 }
 
+/// What a child adds to its parent: its update, of `rim` unknowns, in runs of unknowns that are
+/// neighbours in both. Both ascend from run to run.
+pub struct Child<'a> {
+    pub rim: usize,
+    pub update: &'a [f64],
+    pub runs: &'a [Run],
+}
+
 /// The matrix of a front.
 pub struct Matrix<'a> {
     pub size: Size,
@@ -72,6 +80,20 @@ impl Matrix<'_> {
     pub fn clear(&mut self) {
         self.panel.fill(0.0);
         self.update.fill(0.0);
+    }
+
+    /// All that is stored of a column, also above the diagonal.
+    fn whole_column(&mut self, j: usize) -> &mut [f64] {
+        let Size { own, rim } = self.size;
+        if j < own {
+            let rows = own + rim;
+            &mut self.panel[j * rows..(j + 1) * rows]
+        } else {
+            let (k, within) = ((j - own) / BLOCK, (j - own) % BLOCK);
+            let rows = rim - k * BLOCK;
+            let start = block_start(rim, k) + within * rows;
+            &mut self.update[start..start + rows]
+        }
     }
 
     /// Entries of a column from row `i` on, `i` not above the diagonal.
@@ -104,21 +126,30 @@ impl Matrix<'_> {
         }
     }
 
-    /// Adds a child's update.
-    pub fn add_update<const D: usize>(&mut self, rim: usize, update: &[f64], runs: &[Run]) {
-        for (at, run) in runs.iter().enumerate() {
-            for k in 0..D * run.len as usize {
+    /// Sums up the children's updates, column by column: large fronts go through the cache once.
+    pub fn assemble<const D: usize>(&mut self, mut children: [Child; 2]) {
+        for to in 0..self.size.rows() {
+            self.whole_column(to).fill(0.0);
+            for child in &mut children {
+                let Some((run, later)) = child.runs.split_first() else { continue };
+                let first = D * run.parent as usize;
+                if to < first {
+                    continue;
+                }
+                let k = to - first;
                 let j = D * run.child as usize + k;
-                let column = &update[column_start(rim, j)..];
-                let to = D * run.parent as usize + k;
+                let column = &child.update[column_start(child.rim, j)..];
                 // The rest of this run, then those after it.
                 let rest = D * run.len as usize - k;
                 add(&mut self.column_from(to, to)[..rest], &column[..rest]);
-                for other in &runs[at + 1..] {
+                for other in later {
                     let len = D * other.len as usize;
                     let from = D * other.child as usize - j;
                     let to = &mut self.column_from(to, D * other.parent as usize)[..len];
                     add(to, &column[from..from + len]);
+                }
+                if rest == 1 {
+                    child.runs = later;
                 }
             }
         }

@@ -21,7 +21,7 @@ pub mod tree;
 use super::element::{CellBlocks, pair};
 use crate::simd::Simd;
 use crate::threads;
-use front::{Matrix, Size};
+use front::{Child, Matrix, Size};
 use kernels::Columns;
 use std::ops::Range;
 use std::sync::Arc;
@@ -370,10 +370,12 @@ impl<const D: usize> Factorize<'_, D> {
         updates: [&[f64]; 2],
         runs: &[Vec<Run>; 2],
     ) {
-        matrix.clear();
-        for ((child, update), runs) in children.into_iter().zip(updates).zip(runs) {
-            matrix.add_update::<D>(size::<D>(self.tree, child).rim, update, runs);
-        }
+        let child = |k: usize| Child {
+            rim: size::<D>(self.tree, children[k]).rim,
+            update: updates[k],
+            runs: &runs[k],
+        };
+        matrix.assemble::<D>([child(0), child(1)]);
     }
 
     fn eliminate(&self, f: usize, mut matrix: Matrix) -> Result<(), NotPositiveDefinite> {
