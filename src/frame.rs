@@ -95,12 +95,18 @@ impl GridField {
         if self.nx * self.ny == 0 || outside(0) || outside(1) {
             return f32::NAN;
         }
-        let place = |c: usize, n: usize| {
-            let t = ((point[c] - self.origin[c]) / self.cell[c] - 0.5).clamp(0.0, (n - 1) as f32);
-            let i = (t as usize).min(n.saturating_sub(2));
-            (i, t - i as f32)
-        };
-        let ((i, s), (j, t)) = (place(0, self.nx), place(1, self.ny));
+        self.between(self.place(0, point[0]), self.place(1, point[1]))
+    }
+
+    /// The centre before a coordinate, and how far it is from there to the next, 0 to 1.
+    fn place(&self, c: usize, x: f32) -> (usize, f32) {
+        let n = [self.nx, self.ny][c];
+        let t = ((x - self.origin[c]) / self.cell[c] - 0.5).clamp(0.0, (n - 1) as f32);
+        let i = (t as usize).min(n.saturating_sub(2));
+        (i, t - i as f32)
+    }
+
+    fn between(&self, (i, s): (usize, f32), (j, t): (usize, f32)) -> f32 {
         let (mut sum, mut total) = (0.0, 0.0);
         for (di, dj, weight) in [
             (0, 0, (1.0 - s) * (1.0 - t)),
@@ -122,9 +128,20 @@ impl GridField {
     pub fn on(&self, rect: Rect, nx: usize, ny: usize) -> GridField {
         let size = rect.size();
         let cell = [size[0] / nx.max(1) as f32, size[1] / ny.max(1) as f32];
-        let centre = |k: usize| {
-            let (i, j) = (k % nx, k / nx);
-            [rect.min[0] + (i as f32 + 0.5) * cell[0], rect.min[1] + (j as f32 + 0.5) * cell[1]]
+        let centre = |c: usize, k: usize| rect.min[c] + (k as f32 + 0.5) * cell[c];
+        let inside = |k: usize| {
+            let (low, high) = (self.rect().min[k], self.rect().max[k]);
+            rect.min[k] >= low && rect.max[k] <= high
+        };
+        let values = if self.nx * self.ny > 0 && inside(0) && inside(1) {
+            let columns: Vec<_> = (0..nx).map(|i| self.place(0, centre(0, i))).collect();
+            let row = |j: usize| {
+                let row = self.place(1, centre(1, j));
+                columns.iter().map(move |&column| self.between(column, row))
+            };
+            (0..ny).flat_map(row).collect()
+        } else {
+            (0..nx * ny).map(|k| self.at([centre(0, k % nx), centre(1, k / nx)])).collect()
         };
         GridField {
             name: self.name.clone(),
@@ -132,7 +149,7 @@ impl GridField {
             cell,
             nx,
             ny,
-            values: (0..nx * ny).map(|k| self.at(centre(k))).collect(),
+            values,
             range: self.range,
         }
     }

@@ -130,9 +130,22 @@ impl ColorScale {
         [r, g, b, 255]
     }
 
-    /// The colours of many values, as the bytes of an RGBA image.
+    /// The colours of many values, as the bytes of an RGBA image: of 1024 steps from end to end, more
+    /// than eight bits can tell.
     pub fn image(&self, values: &[f32]) -> Vec<u8> {
-        values.iter().flat_map(|&v| self.color(v)).collect()
+        const STEPS: f32 = 1023.0;
+        let span = self.high - self.low;
+        let palette: Vec<Rgba> = (0..=STEPS as usize)
+            .map(|k| self.color(self.low + span * (k as f32 / STEPS)))
+            .collect();
+        let per_value = if span > 0.0 { STEPS / span } else { 0.0 };
+        let mut image = vec![0; 4 * values.len()];
+        for (texel, &v) in image.as_chunks_mut().0.iter_mut().zip(values) {
+            // What is not a number is none of the palette; beyond an end is the end.
+            let place = ((v - self.low) * per_value + 0.5).clamp(0.0, STEPS);
+            *texel = if v.is_nan() { NOTHING } else { palette[place as usize] };
+        }
+        image
     }
 }
 
@@ -143,7 +156,7 @@ fn lookup(table: &[[u8; 3]], place: f32) -> [u8; 3] {
     let fraction = x - i as f32;
     let mix = |k: usize| {
         let (a, b) = (f32::from(table[i][k]), f32::from(table[i + 1][k]));
-        (a + fraction * (b - a)).round() as u8
+        (a + fraction * (b - a) + 0.5) as u8
     };
     [mix(0), mix(1), mix(2)]
 }

@@ -379,7 +379,7 @@ impl<const D: usize> Simulation<D> {
         self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
         self.step += 1;
         let changed = self.apply_changes();
-        let mut before = std::mem::replace(&mut self.spare, Flow::default());
+        let mut before = std::mem::take(&mut self.spare);
         before.copy_from(&self.flow);
         // After a sudden change the flow before says nothing about the one to come.
         let ahead = (!changed).then(|| self.ahead(self.expected_step(dt)));

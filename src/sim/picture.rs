@@ -1,11 +1,12 @@
 //! What the recording shows of a state: particles, dye, strokes, fields and level lines, in SI.
 
-use super::{Run, Simulation};
+use super::Simulation;
 use crate::frame::{Arrows, GridField, Isoline, ParticleScalar, ParticleSnapshot, Picture};
 use crate::laws::director;
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName};
 use crate::space::flow::{gradient, interpolate};
+use crate::space::mesh::{Axis, Mesh};
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
 use crate::threads;
@@ -55,6 +56,27 @@ impl Raster {
     fn len(&self) -> usize {
         self.n[0] * self.n[1]
     }
+
+    /// Where its columns and rows stand in the mesh.
+    fn stand(&self, mesh: &Mesh) -> [Vec<Stand>; 2] {
+        let stand = |axis: &Axis, x: f64| {
+            let cell = axis.locate(x);
+            let r = axis.span(cell).reference(x);
+            let n = Shape::line(r);
+            Stand { cell, r, n }
+        };
+        let column = |i: usize| stand(&mesh.x, self.centre(i)[0]);
+        let row = |j: usize| stand(&mesh.y, self.centre(j * self.n[0])[1]);
+        [(0..self.n[0]).map(column).collect(), (0..self.n[1]).map(row).collect()]
+    }
+}
+
+/// A column or row of a raster: its cells, where in them it is, and the shape functions there.
+#[derive(Clone, Copy)]
+struct Stand {
+    cell: usize,
+    r: f64,
+    n: [f64; 3],
 }
 
 /// Smallest and largest finite value; `[0, 1]` if there is none.
@@ -166,7 +188,8 @@ impl<const D: usize> Simulation<D> {
         if colour_by == ColourBy::Material {
             return None;
         }
-        let values: Vec<f32> = shown.iter().map(|&p| value(p) as f32).collect();
+        let mut values = vec![0.0; shown.len()];
+        threads::for_each(&mut values, SAMPLE_GRAIN, |k, v| *v = value(shown[k]) as f32);
         let range = match colour_by {
             ColourBy::Alignment => [0.0, 1.0],
             ColourBy::Rotation => symmetric(range(&values)),
@@ -184,21 +207,28 @@ impl<const D: usize> Simulation<D> {
             FieldName::Rotation if D != 3 => return None,
             FieldName::Alignment => ("alignment", self.alignment()?.sample(&raster)),
             FieldName::Speed | FieldName::Rotation | FieldName::Pressure => {
+                let [columns, rows] = raster.stand(mesh);
                 let value = |k: usize| {
-                    let p = raster.centre(k);
-                    let cell = mesh.locate(p);
+                    let (x, y) = (&columns[k % raster.n[0]], &rows[k / raster.n[0]]);
+                    let cell = mesh.cell(x.cell, y.cell);
                     if mesh.solid[cell] {
                         return f32::NAN;
                     }
-                    let si = plan.si(p);
+                    let nodes = mesh.cell_nodes(cell);
+                    let velocity = |c: usize| -> f64 {
+                        let row = |b: usize| -> f64 {
+                            (0..3).map(|a| x.n[a] * self.flow.velocity[nodes[3 * b + a]][c]).sum()
+                        };
+                        (0..3).map(|b| y.n[b] * row(b)).sum()
+                    };
                     (match name {
-                        FieldName::Pressure => self.pressure_at(si),
-                        FieldName::Speed => {
-                            let v = self.velocity_at(si);
-                            v[0].hypot(v[1])
+                        FieldName::Pressure => {
+                            let [p, by_xi, by_eta] = self.flow.pressure[cell];
+                            (p + by_xi * x.r + by_eta * y.r) * plan.units.stress()
                         }
+                        FieldName::Speed => velocity(0).hypot(velocity(1)) * plan.units.velocity(),
                         _ if !self.rotates(cell) => f64::NAN,
-                        _ => self.velocity_at(si)[2],
+                        _ => velocity(D - 1) * plan.units.rate(),
                     }) as f32
                 };
                 let title = match name {

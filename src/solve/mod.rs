@@ -11,4 +11,5 @@ pub mod multifrontal;
 pub mod quadrature;
 pub mod spin;
 pub mod stokes;
+pub mod symbolic;
 pub mod weight;

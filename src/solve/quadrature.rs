@@ -513,6 +513,10 @@ fn content(
 }
 
 /// How the materials of a cell lie.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one at a time, and a box would be allocated"
+)]
 enum Form {
     /// Two with an interface.
     Cut { interface: Interface, between: [usize; 2] },

@@ -28,9 +28,10 @@
 use super::buoyancy::{Restoring, SIDE_NODES};
 use super::element::{Divergence, Internal, Nodal, SKELETON_NODES, TOGETHER, pressure_mass};
 use super::matrices::{Ingredients, Matrices};
-use super::multifrontal::tree::{NO_POSITION, Tree};
+use super::multifrontal::tree::NO_POSITION;
 use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
 use super::quadrature::Quadrature;
+use super::symbolic::Symbolic;
 use crate::simd::Simd;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
@@ -147,7 +148,7 @@ impl SolveError {
 /// The discrete problem on one mesh: boundary conditions, element matrices, factor.
 pub struct Stokes<const D: usize> {
     mesh: Arc<Mesh>,
-    incidence: Incidence,
+    incidence: Arc<Incidence>,
     constraints: Constraints<D>,
     matrices: Matrices<D>,
     factor: Multifrontal<D>,
@@ -257,9 +258,9 @@ struct Residual<const D: usize> {
 
 impl<const D: usize> Stokes<D> {
     pub fn new(mesh: Arc<Mesh>, constraints: Constraints<D>) -> Self {
-        let tree = Arc::new(Tree::new(&mesh));
+        let Symbolic { tree, incidence } = Symbolic::of(&mesh);
         Stokes {
-            incidence: Incidence::new(&mesh),
+            incidence,
             matrices: Matrices::new(mesh.cells()),
             factor: Multifrontal::new(tree, mesh.cells()),
             diagonal: vec![[0.0; D]; mesh.nodes()],

@@ -8,7 +8,7 @@ pub const ON_LINE: f64 = 1e-10;
 pub const INSIDE: f64 = 1.0 - 1e-9;
 
 /// A cell along one direction.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Span {
     pub centre: f64,
     /// Reference coordinates per length.
@@ -23,7 +23,7 @@ impl Span {
 }
 
 /// Mesh lines along one direction, ascending; a periodic axis joins its last line to its first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     lines: Vec<f64>,
     periodic: bool,
@@ -134,7 +134,7 @@ impl Axis {
 }
 
 /// Tensor-product mesh of rectangles. Cell `(i, j)` has index `j nx + i`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     pub x: Axis,
     pub y: Axis,

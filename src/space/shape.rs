@@ -42,6 +42,11 @@ impl Shape {
         s
     }
 
+    /// Values of the three functions of one direction.
+    pub fn line(t: f64) -> [f64; 3] {
+        quadratic(t).0
+    }
+
     /// Only the values; what interpolation needs.
     pub fn values(r: [f64; 2]) -> [f64; NODES] {
         let (fx, _) = quadratic(r[0]);
