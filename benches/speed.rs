@@ -55,7 +55,7 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
 fn main() -> Outcome<()> {
     let args: Vec<String> = std::env::args().collect();
     let quick = args.iter().any(|a| a == "--quick");
-    let sizes: &[usize] = if quick { &[32, 64] } else { &[32, 64, 128, 256] };
+    let sizes: &[usize] = if quick { &[32, 64] } else { &[32, 64, 128, 256, 512] };
     let machine = Machine::measure();
     let mut page = String::from(
         "# How near the machine's limit\n\n\

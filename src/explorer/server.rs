@@ -9,7 +9,7 @@ use super::protocol::{Answer, Command};
 use super::session::Request as Order;
 use crate::record::rerun_log::{ViewerFile, viewer_file};
 use axum::Router;
-use axum::body::{Body, Bytes};
+use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{DefaultBodyLimit, Path, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::middleware::{Next, from_fn_with_state};
@@ -30,8 +30,8 @@ const MAX_BODY: usize = 16 * 1024;
 const MAX_HEAD: usize = 32 * 1024;
 /// Connections at a time.
 const MAX_CONNECTIONS: usize = 128;
-/// How long the head of a request may take.
-const HEAD_PATIENCE: Duration = Duration::from_secs(10);
+/// How long the head of a request may take, and its body.
+const CLIENT_PATIENCE: Duration = Duration::from_secs(10);
 /// How long a stream of states may be silent.
 const HEARTBEAT: Duration = Duration::from_secs(10);
 
@@ -82,7 +82,7 @@ async fn accept(listener: TcpListener, routes: Router) -> std::io::Result<()> {
         let service = TowerToHyperService::new(routes.clone());
         let serving = hyper::server::conn::http1::Builder::new()
             .timer(TokioTimer::new())
-            .header_read_timeout(HEAD_PATIENCE)
+            .header_read_timeout(CLIENT_PATIENCE)
             .max_buf_size(MAX_HEAD)
             .serve_connection(TokioIo::new(stream), service);
         tokio::spawn(async move {
@@ -223,7 +223,7 @@ async fn sketch(State(site): Shared) -> Response {
     }
 }
 
-async fn command(State(site): Shared, headers: HeaderMap, body: Bytes) -> Response {
+async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Response {
     let refuse = |code: StatusCode, answer: Answer| {
         let text = serde_json::to_string(&answer).unwrap_or_default();
         (code, [(header::CONTENT_TYPE, "application/json")], text).into_response()
@@ -234,6 +234,11 @@ async fn command(State(site): Shared, headers: HeaderMap, body: Bytes) -> Respon
         let answer = Answer::no("a command is JSON", "send it as application/json");
         return refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, answer);
     }
+    let body = match tokio::time::timeout(CLIENT_PATIENCE, to_bytes(body, MAX_BODY)).await {
+        Ok(Ok(body)) => body,
+        Ok(Err(_)) => return StatusCode::PAYLOAD_TOO_LARGE.into_response(),
+        Err(_) => return StatusCode::REQUEST_TIMEOUT.into_response(),
+    };
     let command: Command = match serde_json::from_slice(&body) {
         Ok(command) => command,
         Err(e) => {

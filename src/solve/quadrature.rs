@@ -96,6 +96,8 @@ pub struct Quadrature {
     materials: usize,
     /// Cells to be evaluated: room that is kept.
     fresh: Vec<bool>,
+    /// What cells are made of by now; nothing is in an empty one.
+    found: Vec<Option<Content>>,
 }
 
 /// A cell that holds no particles though no background fills it.
@@ -133,6 +135,7 @@ impl Quadrature {
             factors: vec![1.0; materials],
             materials,
             fresh: vec![false; cells],
+            found: vec![None; cells],
         }
     }
 
@@ -227,15 +230,18 @@ impl Quadrature {
         if self.rule == Rule::Particles {
             self.points.clear();
         }
-        for cell in 0..mesh.cells() {
-            let content = if mesh.solid[cell] {
-                Content::Solid
+        threads::for_each(&mut self.found, GRAIN, |cell, found| {
+            *found = if mesh.solid[cell] {
+                Some(Content::Solid)
             } else {
-                content(particles, cell, materials, background, version).ok_or_else(|| {
-                    let [x, y] = mesh.cell_centre(cell);
-                    EmptyCell { cell, x, y }
-                })?
+                content(particles, cell, materials, background, version)
             };
+        });
+        for cell in 0..mesh.cells() {
+            let content = self.found[cell].ok_or_else(|| {
+                let [x, y] = mesh.cell_centre(cell);
+                EmptyCell { cell, x, y }
+            })?;
             // Particles as integration points move: their matrix is never the one before.
             let moving = self.rule == Rule::Particles && !particles.of_cell(cell).is_empty();
             let content = if moving { Content::Mixed } else { content };

@@ -216,23 +216,28 @@ struct Correction<const D: usize> {
 
 impl<const D: usize> Correction<D> {
     fn add_scaled(&mut self, factor: f64, o: &Correction<D>) {
-        fn add<const N: usize>(a: &mut [[f64; N]], factor: f64, b: &[[f64; N]]) {
-            for (a, b) in a.iter_mut().zip(b) {
-                for c in 0..N {
-                    a[c] += factor * b[c];
-                }
-            }
-        }
-        add(&mut self.velocity, factor, &o.velocity);
-        add(&mut self.pressure, factor, &o.pressure);
-        add(&mut self.divergence, factor, &o.divergence);
+        add_scaled(&mut self.velocity, factor, &o.velocity);
+        add_scaled(&mut self.pressure, factor, &o.pressure);
+        add_scaled(&mut self.divergence, factor, &o.divergence);
     }
 
     fn scale(&mut self, factor: f64) {
-        let all = self.velocity.iter_mut().flatten();
-        let all = all.chain(self.pressure.iter_mut().flatten());
-        all.chain(self.divergence.iter_mut().flatten()).for_each(|v| *v *= factor);
+        fn scale<const N: usize>(a: &mut [[f64; N]], factor: f64) {
+            threads::for_each(a, NODE_GRAIN, |_, a| a.iter_mut().for_each(|v| *v *= factor));
+        }
+        scale(&mut self.velocity, factor);
+        scale(&mut self.pressure, factor);
+        scale(&mut self.divergence, factor);
     }
+}
+
+/// `a += factor b`
+fn add_scaled<const N: usize>(a: &mut [[f64; N]], factor: f64, b: &[[f64; N]]) {
+    threads::for_each(a, NODE_GRAIN, |k, a| {
+        for c in 0..N {
+            a[c] += factor * b[k][c];
+        }
+    });
 }
 
 /// Residuals of a state, and powers that come with them.
@@ -622,11 +627,19 @@ impl<const D: usize> Stokes<D> {
         });
         correction.pressure.resize(mesh.cells(), [0.0; 3]);
         correction.divergence.resize(mesh.cells(), [0.0; 3]);
+        let shares = &*shares;
+        threads::for_each(&mut correction.pressure, NODE_GRAIN, |cell, dp| {
+            if !mesh.solid[cell] {
+                dp.copy_from_slice(&shares[cell].sums[..3]);
+            }
+        });
+        threads::for_each(&mut correction.divergence, NODE_GRAIN, |cell, divergence| {
+            if !mesh.solid[cell] {
+                *divergence = shares[cell].divergence;
+            }
+        });
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            let share = &shares[cell];
-            correction.velocity[incidence.nodes[cell][CENTRE]] = share.force[CENTRE];
-            correction.pressure[cell] = [share.sums[0], share.sums[1], share.sums[2]];
-            correction.divergence[cell] = share.divergence;
+            correction.velocity[incidence.nodes[cell][CENTRE]] = shares[cell].force[CENTRE];
         }
     }
 
@@ -671,17 +684,8 @@ impl<const D: usize> Stokes<D> {
     }
 
     fn apply(&self, work: &Work<D>, flow: &mut Flow<D>) {
-        let correction = &work.correction;
-        for (u, du) in flow.velocity.iter_mut().zip(&correction.velocity) {
-            for c in 0..D {
-                u[c] += du[c];
-            }
-        }
-        for (p, dp) in flow.pressure.iter_mut().zip(&correction.pressure) {
-            for q in 0..3 {
-                p[q] += dp[q];
-            }
-        }
+        add_scaled(&mut flow.velocity, 1.0, &work.correction.velocity);
+        add_scaled(&mut flow.pressure, 1.0, &work.correction.pressure);
     }
 
     fn explain(&self, source: NotPositiveDefinite) -> SolveError {

@@ -3,6 +3,8 @@
 use super::http::request;
 use super::{Explorer, PATIENCE, program};
 use serde_json::{Value, json};
+use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// A silo that takes some milliseconds a step.
@@ -284,6 +286,35 @@ fn strangers_are_refused() {
     for header in ["content-security-policy: default-src 'none'", "x-content-type-options: nosniff"]
     {
         assert!(head.contains(header), "{head}");
+    }
+}
+
+/// Who begins to say something and does not go on is cut off, and holds nobody up.
+#[test]
+fn clients_that_take_too_long_are_cut_off() {
+    let explorer = Explorer::open(&SMALL);
+    let (port, page) = (explorer.port(), explorer.below(""));
+    let command = explorer.below("api/command");
+    let body = format!(
+        "POST {command} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Type: application/json\r\n\
+         Content-Length: 100\r\n\r\n{{"
+    );
+    let slow: Vec<TcpStream> = ["GET / HTT", &body]
+        .iter()
+        .map(|said| {
+            let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
+            stream.write_all(said.as_bytes()).expect("sent");
+            stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
+            stream
+        })
+        .collect();
+    assert_eq!(request(port, "GET", &page, &[], b"").code, 200, "nobody is held up");
+    for mut stream in slow {
+        let mut answer = Vec::new();
+        // It ends, with or without a word, long before this side's patience.
+        stream.read_to_end(&mut answer).expect("an end");
+        let answer = String::from_utf8_lossy(&answer);
+        assert!(answer.is_empty() || answer.contains(" 408 "), "{answer}");
     }
 }
 
