@@ -267,26 +267,37 @@ fn a_slow_viewer_loses_only_what_may_be_lost() {
     // Many small pictures, faster than they can be shown.
     let scene = ["run", "couette_cosserat", "--set", "accuracy.cells=8"];
     let pace = ["--set", "time.max_step=2e-4", "--set", "recording.frames=100000"];
-    let port = slow_line(&viewer, 1e6, usize::MAX);
-    let url = address(port);
     let watch = |out: &str, more: &[&str]| {
-        let run = [&scene[..], &pace, &["--steps", "400", "--out", out], more].concat();
-        here.grainscope(&run).exits(0);
-        here.json(&format!("{out}/summary.json"))
+        let run = [&scene[..], &pace, &["--steps", "2000", "--out", out], more].concat();
+        let said = here.grainscope(&run);
+        (said.code == Some(0)).then(|| here.json(&format!("{out}/summary.json")))
     };
-    let alone = watch("alone", &["--no-recording"]);
-    let kept = watch("kept", &["--connect", &url]);
-    let watched = watch("watched", &["--no-recording", "--connect", &url]);
-    println!("{}\n{}", kept["frames"], watched["frames"]);
-    for summary in [&kept, &watched] {
-        assert_eq!(summary["state_hash"], alone["state_hash"]);
-        assert!(summary["frames"]["sent"].as_u64() > Some(400));
+    let alone = watch("alone", &["--no-recording"]).expect("a run");
+    // How slow a line must be depends on how fast this machine is just now.
+    let mut told = Vec::new();
+    for (k, rate) in [8e6, 4e6, 2e6, 1e6].into_iter().enumerate() {
+        let url = address(slow_line(&viewer, rate, usize::MAX));
+        let out = format!("kept{k}");
+        let kept = watch(&out, &["--connect", &url]).expect("a run");
+        // One that is too slow is given up, and then there is nothing to go on for.
+        let watched = watch(&format!("watched{k}"), &["--no-recording", "--connect", &url]);
+        recorded_whole(&here, &out);
+        assert_eq!(kept["frames"]["dropped"], 0);
+        for summary in watched.iter().chain([&kept]) {
+            assert_eq!(summary["state_hash"], alone["state_hash"]);
+            assert!(summary["frames"]["sent"].as_u64() > Some(2000));
+        }
+        let some = |summary: &Value, what: &str| summary["frames"][what].as_u64() > Some(0);
+        if let Some(watched) = &watched {
+            assert!(!some(watched, "waits"), "who only watches keeps nobody waiting");
+            told.push((rate, kept["frames"].to_string(), watched["frames"].to_string()));
+            if some(&kept, "waits") && some(watched, "dropped") {
+                println!("{told:#?}");
+                return;
+            }
+        }
     }
-    assert_eq!(kept["frames"]["dropped"], 0);
-    assert!(kept["frames"]["waits"].as_u64() > Some(0), "it is slow");
-    recorded_whole(&here, "kept");
-    assert!(watched["frames"]["dropped"].as_u64() > Some(0), "it is slow");
-    assert_eq!(watched["frames"]["waits"], 0, "who only watches keeps nobody waiting");
+    panic!("no line was slow: {told:#?}");
 }
 
 #[test]
