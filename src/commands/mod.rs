@@ -76,8 +76,8 @@ struct Cli {
     /// Threads that compute, by default one per processor; no result depends on them
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// The instruction set that kernels use: by default the best that the processor has; results differ
-    /// in their last digits between sets, and runs of two machines are the same on one that both have
+    /// The instruction set that our own kernels use, by default the best that the processor has; results
+    /// differ in their last digits between sets
     #[arg(long, global = true, value_name = "SET", value_parser = instruction_set)]
     simd: Option<Simd>,
 }

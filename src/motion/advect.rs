@@ -3,12 +3,9 @@
 use super::carrier::{CELL_GRAIN, Carrier};
 use super::gauges::Counter;
 use crate::plan::EffectSet;
-use crate::space::particles::{GONE, Particles};
+use crate::space::particles::{GONE, GRAIN, Particles};
 use crate::space::population::Count;
 use crate::threads::{self, Divisible};
-
-/// Particles that are worth a task of their own.
-const GRAIN: usize = 4096;
 
 /// Where all particles come in a step, and what becomes of what they carry: kept from step to step.
 #[derive(Default)]
@@ -57,17 +54,23 @@ impl Divisible for Members<'_> {
         let (to, cell) = (split(self.to, particles), split(self.cell, particles));
         let (held, director) = (split(self.held, particles), split(self.director, particles));
         let stretch = split(self.stretch, particles);
-        let part = |start, to, cell, held, director, stretch| Members {
-            start,
-            to,
-            cell,
-            held,
-            director,
-            stretch,
-        };
         (
-            part(&self.start[..=at], to.0, cell.0, held.0, director.0, stretch.0),
-            part(&self.start[at..], to.1, cell.1, held.1, director.1, stretch.1),
+            Members {
+                start: &self.start[..=at],
+                to: to.0,
+                cell: cell.0,
+                held: held.0,
+                director: director.0,
+                stretch: stretch.0,
+            },
+            Members {
+                start: &self.start[at..],
+                to: to.1,
+                cell: cell.1,
+                held: held.1,
+                director: director.1,
+                stretch: stretch.1,
+            },
         )
     }
 }

@@ -89,12 +89,19 @@ impl Home {
             if r[c].abs() < INSIDE {
                 continue;
             }
-            let side = if r[c] > 0.0 { 2 } else { 0 };
-            r[c] = self.spans[c][side].reference(p[c]);
-            if !(self.free && r[c].abs() < INSIDE) {
+            if !self.free {
                 return None;
             }
-            cell = cell + side / 2 * 2 * self.stride[c] - self.stride[c];
+            let [below, _, above] = self.spans[c];
+            let stride = self.stride[c];
+            let (span, next) =
+                if r[c] > 0.0 { (above, cell + stride) } else { (below, cell - stride) };
+            r[c] = span.reference(p[c]);
+            if r[c].abs() < INSIDE {
+                cell = next;
+            } else {
+                return None;
+            }
         }
         Some((cell, r))
     }

@@ -28,7 +28,7 @@ pub struct Particles {
 }
 
 /// Particles that are worth a task of their own.
-const GRAIN: usize = 4096;
+pub const GRAIN: usize = 4096;
 
 /// The cell of a particle that is to be taken away.
 pub const GONE: u32 = u32::MAX;
