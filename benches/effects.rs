@@ -1,7 +1,7 @@
-//! What each effect adds to a step, as the ratio of a scene with it to the same scene without it,
-//! stepped in turn: `cargo bench --bench effects`. An effect that is named but switched off must
-//! cost nothing: its ratio to a scene that never named it is 1 but for noise, which the same scene
-//! against itself shows.
+//! This benchmark measures the time of each effect as the ratio of a step of a scene with it to a
+//! step of the same scene without it, taken alternately: `cargo bench --bench effects`. An effect
+//! that is named but switched off must take no time: its ratio to a scene that never named it is 1
+//! within noise. The ratio of a scene to itself shows the noise.
 
 use grainscope::cost::effects::{Pair, pair, without};
 use grainscope::cost::measure::timed;
@@ -13,10 +13,10 @@ use grainscope::{plan, scene, sim};
 use std::error::Error;
 use std::sync::Arc;
 
-/// Steps of each scene; medians are compared.
+/// Number of steps of each scene; medians are compared.
 const STEPS: u32 = 15;
 
-/// A fluid under a moving lid; what is below `level` may be another one.
+/// A scene of a fluid under a moving lid.
 const LID: &str = r#"
 schema = 1
 name = "lid"
@@ -39,8 +39,10 @@ bottom.kind = "no_slip"
 top = { kind = "no_slip", velocity_x = "16*x*x*(1-x)*(1-x)" }
 "#;
 
+/// The result of a measurement.
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
+/// The scene of a text, or of the preset of this name, with settings.
 fn source(text: &str, sets: &[&str]) -> Outcome<scene::SceneSource> {
     let sets: Vec<String> = sets.iter().map(|s| s.to_string()).collect();
     let source = if text.contains('\n') {
@@ -51,11 +53,13 @@ fn source(text: &str, sets: &[&str]) -> Outcome<scene::SceneSource> {
     Ok(source.with_sets(&sets)?)
 }
 
+/// The plan of a scene.
 fn plan_of(source: &scene::SceneSource) -> Outcome<Arc<Plan>> {
     let plan = plan::resolve(&scene::parse(source)?).map_err(|e| e.with_source(source))?;
     Ok(Arc::new(plan))
 }
 
+/// Prints both times and their ratio.
 fn print(what: &str, p: Pair) {
     println!(
         "  {what:<44} {:>8.2} ms {:>8.2} ms {:>7.3}",
@@ -65,22 +69,22 @@ fn print(what: &str, p: Pair) {
     );
 }
 
-/// A preset with an effect against the same scene without it.
+/// Compares a preset with an effect and the same scene without it.
 fn removed(text: &str, sets: &[&str], effect: EffectKind, what: &str) -> Outcome<()> {
     let with = source(text, sets)?;
-    let other = without(&scene::parse(&with)?, effect).ok_or("cannot be taken out")?;
+    let other = without(&scene::parse(&with)?, effect).ok_or("the effect cannot be removed")?;
     print(what, pair(&plan_of(&with)?, &Arc::new(plan::resolve(&other)?), STEPS)?);
     Ok(())
 }
 
-/// Two scenes.
+/// Compares two scenes.
 fn against(with: (&str, &[&str]), other: (&str, &[&str]), what: &str) -> Outcome<()> {
     let plan = |(text, sets)| source(text, sets).and_then(|s| plan_of(&s));
     print(what, pair(&plan(with)?, &plan(other)?, STEPS)?);
     Ok(())
 }
 
-/// Seconds that a frame with a picture takes from the simulation's thread, beside a step's.
+/// Compares the time of a step with and without recording a frame, on the simulation's thread.
 fn recording() -> Outcome<()> {
     let plan = plan_of(&source("silo", &[])?)?;
     let file = std::env::temp_dir().join(format!("grainscope-bench-{}.rrd", std::process::id()));
@@ -105,12 +109,12 @@ fn recording() -> Outcome<()> {
     std::fs::remove_file(&file)?;
     let n = f64::from(STEPS);
     print(
-        "recording a picture every step (silo)",
+        "recording a frame every step (silo)",
         Pair { with: (step + frame) / n, without: step / n },
     );
     println!(
-        "  {:<44} {:>8.2} ms a picture, on its own thread",
-        "the logger beside it",
+        "  {:<44} {:>8.2} ms per frame, on its own thread",
+        "the logger",
         1e3 * busy.as_secs_f64() / n
     );
     Ok(())
@@ -139,7 +143,7 @@ fn main() -> Outcome<()> {
     against((LID, &["gravity[1]=-10"]), (LID, &[]), "gravity (lid)")?;
     recording()?;
 
-    println!("\nswitched off, never named (the same): the ratio is 1 but for noise");
+    println!("\nswitched off, never named: the ratio must be 1 within noise");
     against(("silo", &[]), ("silo", &[]), "the same scene twice (silo)")?;
     against(("silo", &["alpha=0"]), (&silo_plain, &[]), "Cosserat rotation (silo)")?;
     against(
@@ -147,7 +151,7 @@ fn main() -> Outcome<()> {
         (&shear_plain, &[]),
         "directors (shear_alignment)",
     )?;
-    against((&named, &[]), (LID, &[]), "a background without room (lid)")?;
+    against((&named, &[]), (LID, &[]), "a background that fills nothing (lid)")?;
     against((LID, &["gravity[1]=0"]), (LID, &[]), "gravity (lid)")?;
     against((LID, &["dye.lines=[]"]), (LID, &[]), "dye lines (lid)")?;
     Ok(())

@@ -1,57 +1,58 @@
-//! What is shown of a simulation: immutable snapshots, in SI units, y up.
+//! This module defines the immutable snapshots of a simulation that are recorded and displayed, in
+//! SI units, y up.
 //!
-//! Nothing here knows how it is drawn. [`RunInfo`] says what does not change
-//! during a run, a [`Frame`] what one step brought.
+//! Snapshots do not depend on how they are drawn. [`RunInfo`] holds what is constant during a run;
+//! a [`Frame`] holds the results of one step.
 
-/// What one step brought. Most steps bring scalars only.
+/// Results of one step. Most steps have scalars only.
 #[derive(Debug, Clone, Default)]
 pub struct Frame {
     /// Number of the step, from 0.
     pub step: u64,
     /// Simulated time (s).
     pub time_s: f64,
-    /// Time spent computing so far (s).
+    /// Wall-clock time of the computation so far (s).
     pub wall_s: f64,
-    /// What is drawn in space; `None` leaves the last picture standing.
+    /// Everything drawn in space; `None` keeps the previous picture.
     pub picture: Option<Picture>,
-    /// Numbers for the plots.
+    /// Values for the plots against time.
     pub scalars: Vec<Scalar>,
-    /// Lines for the log.
+    /// Messages for the log, one line each.
     pub warnings: Vec<String>,
 }
 
-/// Everything drawn in space at one instant. What is empty here is wiped off.
+/// Everything drawn in space at one instant. An empty list clears what was drawn before.
 #[derive(Debug, Clone, Default)]
 pub struct Picture {
-    /// The grains.
+    /// The particles.
     pub particles: ParticleSnapshot,
-    /// Polylines of dyed material (m).
+    /// Dye lines as polylines (m).
     pub dye_lines: Vec<Vec<[f32; 2]>>,
-    /// Headless strokes of the director, from end to end (m).
+    /// Director strokes, each given by its two end points (m).
     pub glyphs: Vec<[[f32; 2]; 2]>,
-    /// Values on regular grids.
+    /// Fields on regular grids.
     pub fields: Vec<GridField>,
-    /// Arrows upon one of the fields.
+    /// Arrows drawn on one of the fields.
     pub arrows: Option<Arrows>,
-    /// Level lines.
+    /// Isolines of fields.
     pub isolines: Vec<Isoline>,
 }
 
-/// Particles at one instant. Their number may change from picture to picture.
+/// Particles at one instant. Their number may differ between pictures.
 #[derive(Debug, Clone, Default)]
 pub struct ParticleSnapshot {
     /// Positions (m).
     pub positions: Vec<[f32; 2]>,
     /// Material of each particle: an index into [`RunInfo::materials`].
     pub class: Vec<u16>,
-    /// What colours the particles; `None` colours them by material.
+    /// Quantity that colours the particles; `None` colours them by material.
     pub scalar: Option<ParticleScalar>,
 }
 
-/// One number per particle, and the scale it is read on.
+/// One value per particle, and its colour scale.
 #[derive(Debug, Clone)]
 pub struct ParticleScalar {
-    /// The scale; [`RunInfo::particle_quantity`] names it.
+    /// Values at the two ends of the colour scale, in the unit of [`RunInfo::particle_quantity`].
     pub range: [f32; 2],
     /// One value per particle.
     pub values: Vec<f32>,
@@ -60,7 +61,7 @@ pub struct ParticleScalar {
 /// Values on a regular grid of cells.
 #[derive(Debug, Clone)]
 pub struct GridField {
-    /// Which of [`RunInfo::fields`] this is, by name.
+    /// Name of the field in [`RunInfo::fields`].
     pub name: String,
     /// Lower left corner of the first cell (m).
     pub origin: [f32; 2],
@@ -70,7 +71,7 @@ pub struct GridField {
     pub nx: usize,
     /// Number of cells along y.
     pub ny: usize,
-    /// `nx * ny` values, row 0 at the lowest y; NaN where there is nothing.
+    /// `nx * ny` values, row 0 at the lowest y; NaN where there is no value.
     pub values: Vec<f32>,
     /// Values at the two ends of the colour scale.
     pub range: [f32; 2],
@@ -84,8 +85,8 @@ impl GridField {
         Rect { min: [x, y], max: [x + dx * self.nx as f32, y + dy * self.ny as f32] }
     }
 
-    /// The value at a point by bilinear interpolation between centres of cells; NaN outside, and
-    /// where most of what is around has no value.
+    /// The value at a point (m) by bilinear interpolation between cell centres; NaN outside the
+    /// grid and where cells without a value have more than half of the weight.
     pub fn at(&self, point: [f32; 2]) -> f32 {
         let rect = self.rect();
         let outside = |c: usize| {
@@ -98,7 +99,8 @@ impl GridField {
         self.between(self.place(0, point[0]), self.place(1, point[1]))
     }
 
-    /// The centre before a coordinate, and how far it is from there to the next, 0 to 1.
+    /// Index of the cell centre before a coordinate, and the position of the coordinate between it
+    /// and the next centre, 0 to 1.
     fn place(&self, c: usize, x: f32) -> (usize, f32) {
         let n = [self.nx, self.ny][c];
         let t = ((x - self.origin[c]) / self.cell[c] - 0.5).clamp(0.0, (n - 1) as f32);
@@ -124,7 +126,7 @@ impl GridField {
         if total >= 0.5 { sum / total } else { f32::NAN }
     }
 
-    /// The field on another grid, which fills `rect` with `nx` times `ny` cells.
+    /// The field interpolated to another grid of `nx` times `ny` cells that fill `rect`.
     pub fn on(&self, rect: Rect, nx: usize, ny: usize) -> GridField {
         let size = rect.size();
         let cell = [size[0] / nx.max(1) as f32, size[1] / ny.max(1) as f32];
@@ -155,22 +157,22 @@ impl GridField {
     }
 }
 
-/// Vectors at points, drawn upon a field.
+/// Vectors at points, drawn on a field.
 #[derive(Debug, Clone)]
 pub struct Arrows {
     /// Name of the field.
     pub field: String,
-    /// Where they start (m).
+    /// Start points (m).
     pub origins: Vec<[f32; 2]>,
-    /// As drawn: lengths are those of the picture, proportional to the vectors.
+    /// Vectors as drawn (m): their drawn lengths are proportional to the quantity.
     pub vectors: Vec<[f32; 2]>,
 }
 
-/// Lines of one level of one field.
+/// Isoline of one field at one level.
 #[derive(Debug, Clone)]
 pub struct Isoline {
-    /// Name of the quantity. If it is one of [`RunInfo::fields`], the lines
-    /// are drawn upon that field, else upon the flow.
+    /// Name of the quantity. If it is one of [`RunInfo::fields`], the lines are drawn on that
+    /// field, otherwise on the flow.
     pub field: String,
     /// The level, in the unit of the field.
     pub level: f32,
@@ -178,74 +180,74 @@ pub struct Isoline {
     pub strips: Vec<Vec<[f32; 2]>>,
 }
 
-/// One number of one step.
+/// One scalar result of one step.
 #[derive(Debug, Clone)]
 pub struct Scalar {
-    /// Where it belongs, such as `gauges/outflow/volume`.
+    /// Path in the recording, such as `gauges/outflow/volume`.
     pub path: String,
     /// The value, in the unit of its [`Series`].
     pub value: f64,
 }
 
 impl Scalar {
-    /// A number and where it belongs.
+    /// A value and its path in the recording.
     pub fn new(path: impl Into<String>, value: f64) -> Self {
         Self { path: path.into(), value }
     }
 }
 
-/// What does not change during a run.
+/// Everything that is constant during a run.
 #[derive(Debug, Clone, Default)]
 pub struct RunInfo {
-    /// Short name; entities live under `runs/<name>`.
+    /// Short name of the run; its entities have paths below `runs/<name>`.
     pub name: String,
-    /// Identity of the recording. Recordings that share it merge in a viewer.
+    /// Identifier of the recording. A viewer merges recordings with the same identifier.
     pub recording_id: String,
-    /// What is looked at.
+    /// The domain of the simulation (m).
     pub domain: Rect,
-    /// Walls and obstacles.
+    /// Walls, sides of blocks and sides of the domain.
     pub walls: Vec<Outline>,
-    /// Lines through which flow is measured.
+    /// Gauges: lines through which the flow is measured.
     pub gauges: Vec<Outline>,
-    /// Materials, in the order of the class numbers.
+    /// Materials, in the order of [`ParticleSnapshot::class`].
     pub materials: Vec<Material>,
     /// Radius at which particles are drawn (m).
     pub particle_radius: f32,
-    /// What [`ParticleSnapshot::scalar`] is, if this run has it.
+    /// Quantity of [`ParticleSnapshot::scalar`], if this run records it.
     pub particle_quantity: Option<Quantity>,
-    /// Fields that pictures may carry; each has a view.
+    /// Fields that pictures may contain; each has a view.
     pub fields: Vec<Quantity>,
     /// Plots against time; each has a view.
     pub plots: Vec<Plot>,
     /// The resolved scene, as TOML.
     pub scene_toml: String,
-    /// What is solved and why, as Markdown.
+    /// List of the solved effects with reasons, as Markdown.
     pub plan_markdown: String,
 }
 
-/// An upright rectangle (m).
+/// An axis-aligned rectangle (m).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Rect {
-    /// Lower left corner.
+    /// Lower left corner (m).
     pub min: [f32; 2],
-    /// Upper right corner.
+    /// Upper right corner (m).
     pub max: [f32; 2],
 }
 
 impl Rect {
-    /// Width and height.
+    /// Width and height (m).
     pub fn size(&self) -> [f32; 2] {
         [self.max[0] - self.min[0], self.max[1] - self.min[1]]
     }
 
-    /// The smallest rectangle around both.
+    /// The smallest rectangle that contains both.
     pub fn around(self, other: Rect) -> Rect {
         let pick = |c: usize| (self.min[c].min(other.min[c]), self.max[c].max(other.max[c]));
         let ((x0, x1), (y0, y1)) = (pick(0), pick(1));
         Rect { min: [x0, y0], max: [x1, y1] }
     }
 
-    /// What both cover; `None` if they share no area.
+    /// Intersection of both; `None` if it has no area.
     pub fn common(self, other: Rect) -> Option<Rect> {
         let pick = |c: usize| (self.min[c].max(other.min[c]), self.max[c].min(other.max[c]));
         let ((x0, x1), (y0, y1)) = (pick(0), pick(1));
@@ -256,36 +258,36 @@ impl Rect {
 /// A named polyline.
 #[derive(Debug, Clone)]
 pub struct Outline {
-    /// Shown beside gauges, and on hovering over walls.
+    /// Name, shown beside gauges and when the pointer is on a wall.
     pub name: String,
-    /// Its corners (m).
+    /// Points of the polyline (m).
     pub points: Vec<[f32; 2]>,
 }
 
-/// A material and the colour it is drawn in.
+/// A material and its colour.
 #[derive(Debug, Clone)]
 pub struct Material {
-    /// Its name.
+    /// Name of the material.
     pub name: String,
-    /// Its colour (sRGB).
+    /// Colour (sRGB).
     pub rgb: [u8; 3],
-    /// Its particles are in the pictures: it belongs into the legend.
+    /// Whether its particles are drawn; if so, the legend lists it.
     pub drawn: bool,
 }
 
 /// A quantity that is shown by colour.
 #[derive(Debug, Clone)]
 pub struct Quantity {
-    /// Its name, such as `speed`.
+    /// Name, such as `speed`.
     pub name: String,
-    /// Its unit, such as `m/s`; empty for pure numbers.
+    /// Unit, such as `m/s`; empty for dimensionless quantities.
     pub unit: String,
-    /// Whether its sign matters: then zero is white, and the scale symmetric.
+    /// Whether the sign matters; if so, zero is white and the colour scale symmetric.
     pub signed: bool,
 }
 
 impl Quantity {
-    /// Name and unit, as a title.
+    /// Title made of the name and the unit.
     pub fn title(&self) -> String {
         if self.unit.is_empty() {
             self.name.clone()
@@ -295,7 +297,7 @@ impl Quantity {
     }
 }
 
-/// Curves that share a plot.
+/// A plot against time with one or more curves.
 #[derive(Debug, Clone)]
 pub struct Plot {
     /// Title, with the unit if the curves share one.
@@ -306,17 +308,17 @@ pub struct Plot {
     pub log10: bool,
 }
 
-/// A curve over time.
+/// A curve against time.
 #[derive(Debug, Clone)]
 pub struct Series {
-    /// The [`Scalar::path`] it collects.
+    /// [`Scalar::path`] of the values.
     pub path: String,
-    /// Its name in the legend, with the unit.
+    /// Name in the legend, with the unit.
     pub name: String,
 }
 
 impl Series {
-    /// A curve of the numbers at `path`.
+    /// A curve of the values at `path`, with its name in the legend.
     pub fn new(path: impl Into<String>, name: impl Into<String>) -> Self {
         Self { path: path.into(), name: name.into() }
     }
@@ -353,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_value_stays_without() {
+    fn interpolation_without_enough_values_gives_nan() {
         let mut field = plane(4, 4);
         field.values[0] = f32::NAN;
         assert!(field.at([0.25, 0.125]).is_nan());

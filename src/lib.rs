@@ -1,17 +1,18 @@
-//! Look into the flow of grains with microstructure: an implicit Material Point Method for fluids
-//! with an internal length (Cosserat) and an orientation (director).
+//! This crate computes the flow of grains with microstructure: an implicit Material Point Method
+//! for fluids with an internal length (Cosserat) and an orientation (director).
 //!
-//! The binary `grainscope` is a thin layer over this library. A tour:
+//! The binary `grainscope` is a thin layer over this library. The modules:
 //!
-//! - [`scene`] reads TOML: what is written. [`plan`] decides what will be solved, and why.
-//! - [`sim`] runs it: [`sim::start`] gives a [`sim::Run`], which takes steps and answers questions
-//!   in SI units.
-//! - [`space`], [`solve`], [`motion`] are what a step is made of; [`laws`] are the equations of the
-//!   source, as functions of small matrices.
-//! - [`record`] writes recordings, tables and plots, and [`compare`] reads them back; [`cases`] are
-//!   scenes with exact solutions, [`verify`] measures them, and [`cost`] says what accuracy costs.
-//! - [`sweep`] makes many runs of one scene; [`export`] hands recordings to other programs.
-//! - [`explorer`] is a run that listens, and a page that shows it.
+//! - [`scene`] reads a scene from TOML. [`plan`] decides what will be solved, and why.
+//! - [`sim`] runs a plan: [`sim::start`] gives a [`sim::Run`], which takes steps and returns
+//!   results in SI units.
+//! - [`space`], [`solve`] and [`motion`] are the parts of a step; [`laws`] holds the equations of
+//!   the source as functions of small matrices.
+//! - [`record`] writes recordings, tables and plots, and [`compare`] reads them back. [`cases`]
+//!   holds scenes with exact solutions, [`verify`] measures their errors, and [`cost`] measures
+//!   error and time of settings.
+//! - [`sweep`] makes many runs of one scene; [`export`] converts recordings for other programs.
+//! - [`explorer`] is an interactive run with a web page.
 //!
 //! ```
 //! use grainscope::{plan, scene, sim};
@@ -37,6 +38,7 @@
 pub mod cases;
 pub mod commands;
 pub mod compare;
+pub mod composition;
 pub mod cost;
 pub mod explorer;
 pub mod export;

@@ -1,30 +1,33 @@
-//! Kernels for the widest vectors that the processor has.
+//! This module compiles kernels for several vector instruction sets and selects one at run time.
 //!
-//! A kernel is written once, over short arrays that the compiler turns into vectors, and compiled for
-//! AVX-512, for AVX2 and for what every processor of the target has. The processor is asked at run
-//! time, so one program runs on all of them. Sums may differ in the last place between instruction
-//! sets, never between runs on one.
+//! A kernel is written once, over short arrays that the compiler turns into vectors. It is compiled
+//! for AVX-512, for AVX2 and for the baseline of the target. The processor is queried at run time,
+//! so one program runs on all of them. Sums may differ in the last digit between instruction sets,
+//! but not between runs with the same instruction set.
 
 use std::sync::OnceLock;
 
-/// Instruction sets that kernels are compiled for, the least first.
+/// Instruction sets that kernels are compiled for, in ascending order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Simd {
+    /// Baseline instruction set of the target.
     Portable,
+    /// AVX2 with fused multiply-add.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// AVX-512 (F, VL and DQ) with fused multiply-add.
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
 
-/// The variable of the environment that names the set kernels use, where no option does.
+/// Environment variable that names the instruction set if no command-line option does.
 pub const VARIABLE: &str = "GRAINSCOPE_SIMD";
 
-/// The most that kernels may use, if it was limited.
+/// Instruction set chosen by [`Simd::limit`], if any.
 static LIMIT: OnceLock<Simd> = OnceLock::new();
 
 impl Simd {
-    /// Sets that kernels are compiled for on this kind of processor, by name.
+    /// Instruction sets that kernels are compiled for on this architecture, with their names.
     pub const NAMES: &[(&str, Simd)] = &[
         ("portable", Simd::Portable),
         #[cfg(target_arch = "x86_64")]
@@ -33,25 +36,27 @@ impl Simd {
         ("avx512", Simd::Avx512),
     ];
 
-    /// The name of this set.
+    /// Name of this instruction set.
     pub fn name(self) -> &'static str {
         Self::NAMES.iter().find(|named| named.1 == self).map_or("portable", |named| named.0)
     }
 
-    /// What kernels use: the best that this processor has, unless [`Simd::limit`] chose less.
+    /// Instruction set that kernels use: the one chosen by [`Simd::limit`], otherwise the best one
+    /// of this processor.
     pub fn used() -> Self {
         Self::limited().unwrap_or_else(Self::detect)
     }
 
-    /// What [`Simd::limit`] chose.
+    /// Instruction set chosen by [`Simd::limit`], if any.
     pub fn limited() -> Option<Self> {
         LIMIT.get().copied()
     }
 
-    /// Chooses the set that kernels use from now on in this process. The first choice stays.
+    /// Chooses the instruction set that kernels use from now on in this process. Later calls have
+    /// no effect.
     ///
     /// # Errors
-    /// The best set that this processor has, if that is less.
+    /// Returns the best instruction set of this processor if it does not support `set`.
     pub fn limit(set: Simd) -> Result<(), Simd> {
         let best = Self::detect();
         if set > best {
@@ -61,7 +66,7 @@ impl Simd {
         Ok(())
     }
 
-    /// The best that this processor has.
+    /// The best instruction set of this processor.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -80,22 +85,21 @@ impl Simd {
     }
 }
 
-/// `a b + c`, in one rounding where that is an instruction.
+/// `a b + c`, rounded once if `FMA` is true.
 #[inline(always)]
 pub fn multiply_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
     if FMA { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// Defines a function that runs a kernel as compiled for an instruction set. The kernel, an
-/// `#[inline(always)]` function, is told the length of its arrays and whether to use
-/// [`multiply_add`] in one rounding: `fn kernel<const LENGTH: usize, const FMA: bool>(..)`, and a
+/// Defines a function that runs a kernel compiled for the given instruction set. The kernel is an
+/// `#[inline(always)]` function whose constants are the length of its arrays and whether
+/// [`multiply_add`] rounds once: `fn kernel<const LENGTH: usize, const FMA: bool>(..)`, and a
 /// further constant if the function has one. Arithmetic in a kernel belongs in loops and in
-/// `#[inline(always)]` functions: a closure that is not inlined is compiled for the least processor,
-/// where [`multiply_add`] in one rounding is a slow call.
+/// `#[inline(always)]` functions: a closure that is not inlined is compiled for the baseline
+/// instruction set, where [`multiply_add`] with one rounding is a slow function call.
 ///
-/// SAFETY of the calls: `Simd::Avx512` and `Simd::Avx2` are made by [`Simd::detect`] only after the
-/// processor said that it has the features which the callee is compiled with; the callee itself is
-/// safe code.
+/// SAFETY of the calls: [`Simd::detect`] returns `Simd::Avx512` and `Simd::Avx2` only if the
+/// processor has the features that the callee is compiled with; the callee itself is safe code.
 macro_rules! dispatch {
     ($(#[$doc:meta])* $vis:vis fn $name:ident $(<const $n:ident: usize>)? ($($arg:ident: $type:ty),* $(,)?)
      $(-> $out:ty)? = $kernel:ident) => {
@@ -129,7 +133,7 @@ macro_rules! dispatch {
 }
 pub(crate) use dispatch;
 
-/// The instruction sets that this processor has, for tests of kernels.
+/// The instruction sets that this processor supports, for tests of kernels.
 #[cfg(test)]
 pub fn all() -> Vec<Simd> {
     let best = Simd::detect();

@@ -1,13 +1,15 @@
-//! Help for tests, ours and those in `tests/`: folders that clean up after themselves.
+//! This module gives unit tests and the tests in `tests/` temporary folders that are removed after
+//! use.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A folder below the system's temporary one that is gone when this is dropped.
+/// A folder in the system's temporary folder; dropping the value removes it.
 #[derive(Debug)]
 pub struct TempFolder(PathBuf);
 
 impl TempFolder {
+    /// Creates an empty folder with a unique name; fails if the system does not allow it.
     pub fn new() -> std::io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -17,6 +19,7 @@ impl TempFolder {
         Ok(TempFolder(path))
     }
 
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.0
     }
@@ -24,7 +27,7 @@ impl TempFolder {
 
 impl Drop for TempFolder {
     fn drop(&mut self) {
-        // What cannot be removed stays in the system's temporary folder.
+        // A folder that cannot be removed stays in the system's temporary folder.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }

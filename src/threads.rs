@@ -1,7 +1,7 @@
-//! Work shared among threads, such that no bit of any result depends on how many there are.
+//! This module distributes work among threads so that no bit of any result depends on their number.
 //!
-//! Tasks write to places of their own, and sums are taken in an order that is fixed by their length.
-//! The threads are those of rayon's pool.
+//! Each task writes to its own part of the output, and sums are taken in an order that depends only
+//! on their length. The threads are those of rayon's pool.
 
 use std::cell::Cell;
 use std::ops::Range;
@@ -10,8 +10,8 @@ thread_local! {
     static ALONE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `f`, and all that it shares out, on this thread alone: for timings of one processor, and
-/// where whole runs are shared out already.
+/// Runs `f` and all work that it distributes on this thread alone. This is used to time one
+/// processor, and where whole runs are already distributed among threads.
 pub fn alone<T>(f: impl FnOnce() -> T) -> T {
     struct Restore(bool);
     impl Drop for Restore {
@@ -27,7 +27,7 @@ fn is_alone() -> bool {
     ALONE.get() || rayon::current_num_threads() == 1
 }
 
-/// Runs two tasks, at the same time if they are worth it.
+/// Runs two tasks and returns both results; the tasks run in parallel if `worth` is true.
 pub fn both<A: Send, B: Send>(
     worth: bool,
     a: impl FnOnce() -> A + Send,
@@ -36,7 +36,7 @@ pub fn both<A: Send, B: Send>(
     if worth && !is_alone() { rayon::join(a, b) } else { (a(), b()) }
 }
 
-/// Calls `f` with each item and its index; about `grain` of them are worth a task.
+/// Calls `f` with the index of each item and the item. One task processes at most `grain` items.
 pub fn for_each<T: Send>(items: &mut [T], grain: usize, f: impl Fn(usize, &mut T) + Sync) {
     fn part<T: Send>(
         items: &mut [T],
@@ -56,14 +56,14 @@ pub fn for_each<T: Send>(items: &mut [T], grain: usize, f: impl Fn(usize, &mut T
     part(items, 0, grain, &f);
 }
 
-/// Data that can be cut in two, to be worked on at the same time.
+/// Data that can be divided into two parts for parallel work.
 pub trait Divisible: Sized + Send {
-    /// The part before an index, and the rest.
+    /// The part before the index `at`, and the rest.
     fn cut(self, at: usize) -> (Self, Self);
 }
 
-/// Calls `f` with parts of `data` and the range of indices that each stands for; about `grain`
-/// indices are worth a task.
+/// Divides `data` into parts and calls `f` with the range of indices of each part and the part.
+/// One task processes at most `grain` indices.
 pub fn for_parts<P: Divisible>(
     data: P,
     range: Range<usize>,
@@ -90,9 +90,9 @@ pub fn for_parts<P: Divisible>(
     part(data, range, grain, &f);
 }
 
-/// Sums of `f` over a range of indices, pairwise.
+/// Sum of each of the `N` components of `f` over a range of indices, by pairwise summation.
 pub fn sum<const N: usize>(range: Range<usize>, f: impl Fn(usize) -> [f64; N] + Sync) -> [f64; N] {
-    /// Terms that are added one after the other.
+    /// Largest number of terms that are added one after the other.
     const GRAIN: usize = 512;
     fn plus<const N: usize>(mut a: [f64; N], b: [f64; N]) -> [f64; N] {
         a.iter_mut().zip(b).for_each(|(a, b)| *a += b);

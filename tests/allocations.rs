@@ -1,7 +1,7 @@
-//! A step takes no memory that the steps before it have not taken.
+//! Steps allocate no memory after the first ones.
 //!
-//! All allocations of this program are counted; so these tests have a program of their own, and run
-//! one after the other.
+//! All allocations of this program are counted. Therefore these tests are a separate program and
+//! run one after the other.
 
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse, presets};
@@ -11,13 +11,14 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
+/// The system allocator, with a count of its allocations.
 struct Counting;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// One count at a time.
+/// Held while a test counts allocations.
 static ALONE: Mutex<()> = Mutex::new(());
 
-// SAFETY: everything is passed on to the system's allocator; a counter is no part of the memory.
+// SAFETY: all calls are passed on to the system allocator; the counter does not touch the memory.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
@@ -39,7 +40,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// Allocations of each step after some first ones, steps examined and kept as by `run`.
+/// Allocations of each of `steps` steps after the `first` ones. Steps are checked as by `run`.
 fn allocations(source: SceneSource, sets: &[&str], first: usize, steps: usize) -> Vec<u64> {
     let _alone = ALONE.lock();
     let sets: Vec<String> = sets.iter().map(|s| s.to_string()).collect();
@@ -70,7 +71,7 @@ fn steps_after_the_first_allocate_nothing() {
             let counts = allocations(SceneSource::new("shear.toml", shear), sets, 6, 20);
             assert!(counts.iter().all(|&n| n == 0), "{sets:?}: {counts:?}");
         }
-        // Directors turn; dye is drawn out.
+        // Directors rotate; dye lines are stretched.
         for (name, cells) in [("shear_alignment", 6), ("couette_cosserat", 6)] {
             let source = presets::find(name).expect("listed");
             let counts = allocations(source, &[&format!("accuracy.cells={cells}")], 10, 20);
@@ -79,9 +80,8 @@ fn steps_after_the_first_allocate_nothing() {
     });
 }
 
-/// Where an interface goes through cells that it was not in, those get room of their own, a row of
-/// cells at a time at most; particles are made and merged; a solution may take a correction more than any
-/// before it.
+/// Allocations occur when an interface enters new cells (at most a row of cells at a time), when
+/// particles are split and merged, and when a solution takes more corrections than any before it.
 #[test]
 fn a_moving_interface_allocates_for_new_cells_only() {
     threads::alone(|| {

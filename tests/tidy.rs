@@ -1,9 +1,9 @@
-//! The invariants of ARCHITECTURE.md, checked on the sources.
+//! Checks the invariants of ARCHITECTURE.md on the source files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Rooms of the house, ground floor first, and what each may import.
+/// Modules of the library, lowest layer first, and the modules that each may import.
 const ROOMS: [(&str, &[&str]); 21] = [
     ("testing", &[]),
     ("threads", &[]),
@@ -34,6 +34,7 @@ const ROOMS: [(&str, &[&str]); 21] = [
     ),
 ];
 
+/// Adds all Rust files below a folder to a list.
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -45,6 +46,7 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
+/// All Rust files of `src`, sorted.
 fn all_sources() -> Vec<PathBuf> {
     let mut list = Vec::new();
     sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut list);
@@ -52,14 +54,14 @@ fn all_sources() -> Vec<PathBuf> {
     list
 }
 
-/// First folder (or file) below `src` that a source lies in.
+/// Top-level module of a source file.
 fn room(path: &Path) -> String {
     let below = path.strip_prefix(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap();
     let first = below.components().next().unwrap().as_os_str().to_string_lossy().into_owned();
     first.trim_end_matches(".rs").to_string()
 }
 
-/// Lines of code outside tests, with their numbers.
+/// Lines of code outside unit tests, with line numbers; without comment lines.
 fn code(path: &Path) -> Vec<(usize, String)> {
     let text = fs::read_to_string(path).unwrap();
     text.lines()
@@ -71,7 +73,7 @@ fn code(path: &Path) -> Vec<(usize, String)> {
 }
 
 #[test]
-fn imports_go_one_way() {
+fn imports_follow_the_layers() {
     let mut faults = Vec::new();
     for path in all_sources() {
         let room = room(&path);
@@ -81,7 +83,7 @@ fn imports_go_one_way() {
         let (_, allowed) = ROOMS
             .iter()
             .find(|(name, _)| *name == room)
-            .unwrap_or_else(|| panic!("{room} is not in ARCHITECTURE.md's list of rooms"));
+            .unwrap_or_else(|| panic!("{room} is not in the list of modules in tests/tidy.rs"));
         for (number, line) in code(&path) {
             for part in line.split("crate::").skip(1) {
                 let used: String =
@@ -96,20 +98,20 @@ fn imports_go_one_way() {
 }
 
 #[test]
-fn only_the_recorder_names_rerun() {
+fn only_the_recorder_uses_rerun() {
     for path in all_sources() {
         if path.to_string_lossy().contains("record/rerun_log") {
             continue;
         }
         for (number, line) in code(&path) {
-            assert!(!line.contains("rerun::"), "{}:{number} names rerun", path.display());
+            assert!(!line.contains("rerun::"), "{}:{number} uses rerun", path.display());
         }
     }
 }
 
 #[test]
 fn nothing_unwraps_or_uses_unsafe_code() {
-    // Calls of what is compiled for an instruction set that the processor was asked for.
+    // `simd.rs` calls functions compiled for an instruction set after checking the processor.
     let simd = Path::new("src/simd.rs");
     for path in all_sources() {
         for (number, line) in code(&path) {
@@ -124,13 +126,13 @@ fn nothing_unwraps_or_uses_unsafe_code() {
 }
 
 #[test]
-fn every_module_says_what_it_is() {
+fn every_module_has_a_doc_comment() {
     for path in all_sources() {
         let text = fs::read_to_string(&path).unwrap();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         assert!(
             text.starts_with("//!") || name == "main.rs",
-            "{} has no module doc",
+            "{} has no module doc comment",
             path.display()
         );
     }

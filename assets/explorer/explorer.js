@@ -1,5 +1,5 @@
-// The page of the explorer. It keeps no state of its own but what is being typed: everything shown
-// comes from the session, so that several pages show the same.
+// This file is the page of the explorer. Its only state is the text being typed: everything it
+// shows comes from the session, so that several pages show the same.
 "use strict";
 
 const $ = (id) => document.getElementById(id);
@@ -14,7 +14,7 @@ function make(tag, properties = {}, ...children) {
   return node;
 }
 
-// --- speaking to the session ---
+// --- communication with the session ---
 
 async function send(command) {
   let answer;
@@ -67,7 +67,7 @@ async function fetchCurves(id, points) {
       renderPlots();
     }
   } catch (_) {
-    // The next state tries again.
+    // The next state from the session causes another attempt.
   } finally {
     fetching.delete(id);
   }
@@ -75,7 +75,8 @@ async function fetchCurves(id, points) {
 
 // --- the parts of the page ---
 
-// Renders a part only if what it shows has changed, so that nothing that is being used moves.
+// Whether the data of a part have changed. Unchanged parts are not rendered, so that controls in
+// use do not move.
 const seen = new Map();
 function changed(part, value) {
   const text = JSON.stringify(value);
@@ -120,7 +121,7 @@ function render() {
   renderWarnings();
   renderPlots();
   if (state.news && state.news.number > lastNews) {
-    // What this page asked for is answered to it already.
+    // Answers to requests of this page were shown already.
     if (lastNews > 0 && $("toast").textContent.split(" — ")[0] !== state.news.text) toast(state.news.text, state.news.good);
     lastNews = state.news.number;
   }
@@ -132,7 +133,7 @@ function showStream() {
   if (viewerReady && state && state.stream) $("viewer").contentWindow.show(state.stream, state.run ? state.run.time : null, state.pins.length > 0);
 }
 
-// --- a sketch, until the viewer shows its first picture ---
+// --- a sketch of the flow, until the viewer shows its first frame ---
 
 let sketching = false;
 let sketched = null;
@@ -145,7 +146,7 @@ async function sketch() {
     if (response.ok) drawSketch($("sketch"), await response.json());
     sketched = id;
   } catch (_) {
-    // The next state tries again.
+    // The next state from the session causes another attempt.
   } finally {
     sketching = false;
   }
@@ -219,11 +220,12 @@ function renderLights(lights) {
   $("lights").replaceChildren(...lights.map((l) => make("li", {
     className: l.good ? "" : "bad",
     title: `${l.meaning}; must stay below ${short(l.bound)}`,
-    ariaLabel: `${l.name} ${short(l.value, 2)}, ${l.good ? "within its bound of" : "beyond its bound of"} ${short(l.bound)}`,
+    ariaLabel: `${l.name} ${short(l.value, 2)}, ${l.good ? "below its bound of" : "above its bound of"} ${short(l.bound)}`,
   }, make("span", { className: "name" }, l.name), make("span", {}, short(l.value, 2)))));
 }
 
-// Sliders go over equal ratios where a range spans many, from zero in equal steps of a root.
+// The scale of a slider: logarithmic for a wide range above zero, a fourth power for a wide range
+// from zero, else linear. `at` maps a value to 0..1, `value` maps back.
 function scale(knob) {
   const { min, max } = knob;
   if (min > 0 && max / min >= 50) {
@@ -286,7 +288,7 @@ function makeKnob(knob) {
   field.onblur = () => { if (box.dataset.turning) apply(); };
   const label = make("label", { htmlFor: id, title: knob.label }, knob.label);
   if (knob.restarts) {
-    label.prepend(make("span", { className: "tag", title: `Restarts the run: it changes ${knob.restarts}` }, "restarts"));
+    label.prepend(make("span", { className: "tag", title: `A change restarts the run: it changes ${knob.restarts}` }, "restarts"));
   }
   const entry = make("div", { className: knob.unit ? "box unit" : "box" }, field);
   if (knob.unit) entry.append(make("span", {}, knob.unit));
@@ -353,19 +355,19 @@ function renderDial() {
     const last = priced ? (d.error === null ? "–" : `${short(100 * d.error, 2)} %`) : `${short(d.unknowns / 1000, 3)} k`;
     return make("label", { className: `line${d.current ? " current" : ""}` }, input,
       make("span", {}, `${d.cells} cells`),
-      make("span", {}, d.seconds_per_step === null ? "–" : `${d.current ? "" : "≈ "}${seconds(d.seconds_per_step)} a step`),
+      make("span", {}, d.seconds_per_step === null ? "–" : `${d.current ? "" : "≈ "}${seconds(d.seconds_per_step)} per step`),
       make("span", {}, last));
   });
   const heads = make("div", { className: "heads" }, make("span"), make("span", { title: "per domain.length_scale" }, "per length"), make("span"), make("span", {}, priced ? "error" : "unknowns"));
-  const dial = make("fieldset", { className: "dial", ariaLabel: "Cells per length, coarse to fine; another choice restarts" }, heads, ...lines);
+  const dial = make("fieldset", { className: "dial", ariaLabel: "Cells per length, coarse to fine; another choice restarts the run" }, heads, ...lines);
   $("dial").replaceChildren(dial);
   if (!priced && state.dial.length) {
-    $("dial").append(make("p", { className: "hint" }, `Another choice restarts. Errors: grainscope cost ${state.title}`));
+    $("dial").append(make("p", { className: "hint" }, `Another choice restarts the run. For errors, run: grainscope cost ${state.title}`));
   }
   if (focused) { const again = dial.querySelector(":checked"); if (again) again.focus(); }
 }
 
-// Of the run itself, then of pins.
+// The colour of the run (k = 0) or of pin k.
 function color(k) { return k === 0 ? "var(--accent)" : COLORS[k % COLORS.length]; }
 
 function renderPins() {
@@ -374,7 +376,7 @@ function renderPins() {
   $("pin-name").placeholder = suggestion;
   $("pins").replaceChildren(...state.pins.map((p, k) => make("li", {},
     make("span", { className: "swatch", style: `background:${color(k + 1)}` }),
-    make("span", {}, p.name, make("small", {}, `${p.values || "as in the file"}; ${p.steps} steps to ${short(p.time)} s`)),
+    make("span", {}, p.name, make("small", {}, `${p.values || "values of the file"}; ${p.steps} steps to ${short(p.time)} s`)),
     make("button", { className: "small", ariaLabel: `Unpin ${p.name}`, onclick: () => send({ do: "unpin", name: p.name }) }, "Unpin"))));
 }
 
@@ -399,7 +401,7 @@ function renderWarnings() {
 
 // --- curves ---
 
-const chosen = [null, null, null]; // by the user; else what is usual for the scene
+const chosen = [null, null, null]; // columns chosen by the user; null for the default of the scene
 const WORDS = { dt: "time step (s)", power_error: "power balance", volume_error: "volume error", max_speed: "largest speed (m/s)", dissipation: "dissipation (W/m)" };
 
 function title(column) {
@@ -432,7 +434,7 @@ function renderPlots() {
   [...$("plots").children].forEach((part) => plot(part.lastChild, part.firstChild.value, runs, changes));
 }
 
-// --- what the user does ---
+// --- actions of the user ---
 
 const toggle = () => send({ do: state && state.mode === "running" ? "pause" : "run" });
 $("run").onclick = toggle;
@@ -440,7 +442,7 @@ $("step").onclick = () => send({ do: "step" });
 $("restart").onclick = () => send({ do: "restart" });
 $("stop").onclick = () => send({ do: "stop" });
 $("live").onclick = () => { if (viewerReady) $("viewer").contentWindow.goLive(); };
-$("quit").onclick = () => { if (confirm("End grainscope? Runs that are not saved are lost.")) send({ do: "quit" }); };
+$("quit").onclick = () => { if (confirm("End grainscope? Unsaved runs are lost.")) send({ do: "quit" }); };
 $("scene").onchange = async (event) => {
   const answer = await send({ do: "load", scene: event.target.value });
   if (!answer.accepted) { seen.delete("scenes"); renderScenes(); }
@@ -461,7 +463,7 @@ document.addEventListener("keydown", (event) => {
   const at = event.target;
   const typing = at.matches("input[type=text], form input, select, textarea");
   if (typing) return;
-  // The space bar of a control that has the focus is that control's.
+  // A control that has the focus handles the space bar itself.
   if (event.key === " " && at.matches("button, input, summary, a")) return;
   if (press(event.key)) event.preventDefault();
 });

@@ -1,4 +1,4 @@
-// Curves of several runs in one small drawing.
+// This file draws plots with curves of several runs, and the sketch of the flow.
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -11,7 +11,7 @@ function draw(tag, attributes, text) {
   return node;
 }
 
-// A number in few letters.
+// Formats a number with few characters.
 function short(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
@@ -23,7 +23,7 @@ function short(value, digits = 3) {
   return String(Number(value.toPrecision(digits)));
 }
 
-// Round numbers that divide a range.
+// Returns about `count` round numbers within a range, for the ticks of an axis.
 function ticks(low, high, count) {
   const step0 = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(step0));
@@ -33,7 +33,8 @@ function ticks(low, high, count) {
   return list;
 }
 
-// runs: [{color, width, curves: {columns, points}}]; changes: times.
+// Draws one column of several runs into an SVG element.
+// runs: [{name, color, width, curves: {columns, points}}]; changes: times of parameter changes.
 function plot(svg, column, runs, changes) {
   const box = svg.getBoundingClientRect();
   const [w, h] = [Math.max(box.width, 60), Math.max(box.height, 40)];
@@ -52,7 +53,7 @@ function plot(svg, column, runs, changes) {
   const label = `${column}: ${runs.map((r) => r.name).join(", ")}`;
   svg.setAttribute("aria-label", label);
   if (all.length === 0) {
-    svg.append(draw("text", { x: w / 2, y: h / 2, "text-anchor": "middle" }, "nothing yet"));
+    svg.append(draw("text", { x: w / 2, y: h / 2, "text-anchor": "middle" }, "no data yet"));
     return;
   }
   const range = (k) => {
@@ -93,7 +94,7 @@ function plot(svg, column, runs, changes) {
   }
 }
 
-// Grains, dye and walls on a canvas.
+// Draws grains, dye and walls on a canvas.
 function drawSketch(canvas, picture) {
   const box = canvas.getBoundingClientRect();
   const dense = devicePixelRatio || 1;

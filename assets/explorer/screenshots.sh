@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes pictures of the explorer's page in its states: assets/explorer/pictures/*.png.
+# Makes screenshots of the states of the explorer's page: assets/explorer/pictures/*.png.
 # Needs chromium and chromedriver (Debian: chromium, chromium-driver).
 set -euo pipefail
 cd "$(dirname "$0")/../.."

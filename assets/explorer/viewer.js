@@ -1,27 +1,27 @@
-// The Rerun viewer, and what the page around it may ask of it.
+// This file starts the Rerun viewer and handles the requests of the page around it.
 "use strict";
 
 const TIMELINE = "sim_time"; // nanoseconds
 
 let handle = null;
-let shown = null; // the stream on screen
-let wanted = null; // the stream asked for last
-let now = null; // seconds that the run has come to
-let beside = false; // whether other runs stand beside it
-const set = new Set(); // where this page has put the time cursor
-let arrived = false; // whether it has been there
-let moved = false; // whether somebody else has moved it since
+let shown = null; // the stream that is displayed
+let wanted = null; // the stream that was requested last
+let now = null; // current time of the run, seconds
+let beside = false; // whether other runs are displayed beside it
+const set = new Set(); // times to which this page has set the time cursor
+let arrived = false; // whether the cursor has reached one of them
+let moved = false; // whether the user has moved the cursor since
 
-// The viewer tells its console about every shader; browsers keep all of that.
+// The viewer logs every shader to the console, and browsers keep all messages: debug output is off.
 console.debug = () => {};
 
-// The viewer takes the focus when it starts; it is to have it when somebody clicks into it.
+// The viewer takes the focus when it starts. It may have the focus only after a click into it.
 const focus = HTMLElement.prototype.focus;
 HTMLElement.prototype.focus = function (...options) {
   if (document.hasFocus()) focus.apply(this, options);
 };
 
-// And the keys of the page around it work there too.
+// The keyboard shortcuts of the page around the viewer also work inside it.
 window.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !" srxpl".includes(event.key)) return;
   event.stopImmediatePropagation();
@@ -46,8 +46,8 @@ async function start() {
   setInterval(follow, 150);
 }
 
-// Brings the recording that is wanted to the front as soon as its first data are there, and then
-// lets go of the one before.
+// Displays the requested recording as soon as its first data have arrived, and then closes the
+// previous one.
 function follow() {
   if (handle.has_panicked()) {
     parent.postMessage({ viewer: "failed", why: String(handle.panic_message()) }, location.origin);
@@ -67,7 +67,7 @@ function follow() {
     try {
       handle.set_active_recording_id(wanted.recording);
     } catch (_) {
-      // Not there yet.
+      // The recording has not arrived yet.
     }
     return;
   }
@@ -77,8 +77,8 @@ function follow() {
   parent.postMessage({ viewer: "showing", recording: shown.recording }, location.origin);
 }
 
-// Keeps the time cursor at the run's own instant, which those beside it may be far ahead of, until
-// somebody moves it.
+// Keeps the time cursor at the current time of the run until the user moves it. Runs beside it may
+// be far ahead.
 function keepPace() {
   const id = shown.recording;
   const range = handle.get_timeline_time_range(id, TIMELINE);
@@ -88,17 +88,19 @@ function keepPace() {
   else if (arrived) moved = true;
   const to = Math.min(Math.round(1e9 * now), Number(range.max));
   if (moved || set.has(to)) return;
-  // What is set shows with one of the next pictures.
+  // The new time takes effect with one of the next frames of the viewer.
   set.add(to);
   handle.set_playing(id, false);
   handle.set_time_for_timeline(id, TIMELINE, to);
 }
 
+// Forgets the earlier positions of the time cursor, so that it follows the run.
 function takeOver() {
   [arrived, moved] = [false, false];
   set.clear();
 }
 
+// Requests a stream; `time` is the current time of the run, `others` whether runs are beside it.
 window.show = (stream, time, others) => {
   [now, beside] = [time, others];
   if (wanted && wanted.url === stream.url) return;
@@ -106,7 +108,7 @@ window.show = (stream, time, others) => {
   wanted = { ...stream };
 };
 
-// Follows the run again after the time cursor was moved.
+// Makes the time cursor follow the run again after the user has moved it.
 window.goLive = () => {
   if (!shown) return;
   const range = handle.get_timeline_time_range(shown.recording, TIMELINE);

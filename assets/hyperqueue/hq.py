@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
-"""HyperQueue without its `hq` binary: the commands of it that a sweep needs.
+"""Replacement of HyperQueue's `hq` binary with the commands that a sweep needs.
 
 The Python package (`pip install hyperqueue==0.27.0`) holds server, worker and client, but no `hq`.
-This driver offers them under the same names and arguments:
+This script offers them with the same commands and arguments:
 
-    hq.py server start                    a server, until it is ended (Ctrl-C, or `server stop`)
+    hq.py server start                    run a server until it is stopped (Ctrl-C or `server stop`)
     hq.py server stop
-    hq.py worker start [--cpus N]         a worker of that server, until one of the two ends
-    hq.py job submit-file JOB.toml        what `grainscope sweep --engine hq` writes
+    hq.py worker start [--cpus N]         run a worker of that server until one of the two ends
+    hq.py job submit-file JOB.toml        submit the file that `grainscope sweep --engine hq` writes
     hq.py job wait JOB
 
-all with `--server-dir DIR` (default: HQ_SERVER_DIR, else ~/.hq-server), which servers, workers and
-clients share. Tell grainscope with HQ_ENTRY="python3 .../hq.py". Its workers know cores only: what
-tasks ask of memory is left out, so give workers no more cores than their memory holds cases.
+All commands take `--server-dir DIR` (default: HQ_SERVER_DIR, else ~/.hq-server), the same for
+server, workers and clients. grainscope uses this script if HQ_ENTRY="python3 .../hq.py". Workers
+count cores only and ignore the memory that tasks request, so give a worker no more cores than the
+number of cases that fit into its memory.
 
 Needs Python 3.11 or later.
 """
@@ -35,17 +36,18 @@ try:
 except ImportError as e:
     sys.exit(f"the Python package of HyperQueue is missing ({e}); pip install hyperqueue==0.27.0")
 
-# How often a worker asks whether its server is still there, seconds.
+# Interval at which a worker checks whether its server still exists, seconds.
 ASK = 1.0
 
 
 def end_on_signals():
-    """Ends the process at once: the threads of server and worker do not."""
+    """Makes signals end the process at once, since the threads of server and worker do not stop."""
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: os._exit(0))
 
 
 def serve(directory):
+    """Runs a server until it is stopped."""
     directory.mkdir(parents=True, exist_ok=True)
     cluster = Cluster(str(directory))
     print(f"HyperQueue server in {directory}", flush=True)
@@ -56,7 +58,7 @@ def serve(directory):
 
 @contextlib.contextmanager
 def silence():
-    """Nothing that is written to the standard output is shown, whoever writes it."""
+    """Discards everything that is written to the standard output, also by native code."""
     sys.stdout.flush()
     kept = os.dup(1)
     with open(os.devnull, "wb") as nothing:
@@ -69,6 +71,7 @@ def silence():
 
 
 def alive(directory):
+    """Whether a server can be reached in this directory."""
     try:
         ClientConnection(str(directory))
         return True
@@ -77,11 +80,11 @@ def alive(directory):
 
 
 def work(directory, cpus):
-    """A worker in a process of its own.
+    """Runs a worker in a separate process.
 
-    The package starts a worker only beside a server of the same process, and lets it find that
-    server by the link `hq-current` in its folder. So there is a server that nobody uses, and the
-    link is turned to the one that is meant.
+    The package starts a worker only together with a server in the same process; the worker finds
+    that server by the link `hq-current` in its folder. So an unused server is started, and the link
+    is changed to the intended server.
     """
     meant = directory / "hq-current"
     if not meant.exists():
@@ -125,7 +128,7 @@ def task(number, said):
 def submit(directory, path):
     said = tomllib.loads(Path(path).read_text())
     tasks = [task(number, each) for number, each in enumerate(said["task"], 1)]
-    # None: a task that fails cancels no other.
+    # With max_fails = None a failed task does not cancel others.
     job = JobDescription(name=said.get("name"), tasks=tasks, max_fails=said.get("max_fails"))
     print(ClientConnection(str(directory)).submit_job(job))
 

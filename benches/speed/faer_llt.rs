@@ -1,4 +1,5 @@
-//! faer's supernodal Cholesky factorisation of the same matrix, in the same order of elimination.
+//! This module wraps faer's supernodal Cholesky factorisation of the same matrix, with the same
+//! order of elimination.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
@@ -14,6 +15,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 use std::collections::BTreeMap;
 
+/// A sparse matrix and its Cholesky factor by faer.
 pub struct FaerLlt {
     col_ptr: Vec<usize>,
     row_idx: Vec<usize>,
@@ -24,7 +26,7 @@ pub struct FaerLlt {
 }
 
 impl FaerLlt {
-    /// From the entries on and below the diagonal, column by column.
+    /// Makes the matrix from its entries on and below the diagonal: one map of rows per column.
     pub fn new(columns: &[BTreeMap<usize, f64>]) -> super::Outcome<Self> {
         let n = columns.len();
         let (mut col_ptr, mut row_idx, mut values) = (vec![0], vec![], vec![]);
@@ -60,6 +62,7 @@ impl FaerLlt {
         Ok(FaerLlt { col_ptr, row_idx, values, symbolic, factor, scratch })
     }
 
+    /// Factors the matrix on one thread.
     pub fn factorize(&mut self) -> super::Outcome<()> {
         let n = self.col_ptr.len() - 1;
         let pattern =
@@ -77,6 +80,7 @@ impl FaerLlt {
         Ok(())
     }
 
+    /// Solves in place: `x` is the right-hand side, then the solution.
     pub fn solve(&mut self, x: &mut [f64]) -> super::Outcome<()> {
         let n = x.len();
         SupernodalLltRef::new(supernodal(&self.symbolic)?, &self.factor).solve_in_place_with_conj(
@@ -89,6 +93,7 @@ impl FaerLlt {
     }
 }
 
+/// The supernodal symbolic factorisation.
 fn supernodal(s: &SymbolicCholesky<usize>) -> super::Outcome<&SymbolicSupernodalCholesky<usize>> {
     match s.raw() {
         SymbolicCholeskyRaw::Supernodal(s) => Ok(s),

@@ -1,25 +1,27 @@
-//! Rates of the machine, one thread.
+//! This module measures the rates of the machine on one thread.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use std::fmt;
 use std::hint::black_box;
 
-/// Columns of the product: its matrices are beyond the second cache.
+/// Number of rows and columns of the matrices of the product, which exceed the second-level cache.
 const SIZE: usize = 768;
-/// Entries of the arrays that are read and copied: 256 MB.
+/// Number of entries of the arrays that are read and copied: 256 MB.
 const LONG: usize = 32 << 20;
 
+/// Rates of the machine on one thread.
 pub struct Machine {
-    /// Additions and multiplications a second.
+    /// Rate of a dense matrix product, operations per second.
     pub product: f64,
-    /// Bytes a second.
+    /// Rate of reading, bytes per second.
     pub read: f64,
-    /// Bytes read and written a second.
+    /// Rate of copying, bytes read and written per second.
     pub copy: f64,
 }
 
 impl Machine {
+    /// Measures the rates.
     pub fn measure() -> Self {
         let (a, b) = (vec![1.0; SIZE * SIZE], vec![0.5; SIZE * SIZE]);
         let mut c = vec![0.0; SIZE * SIZE];

@@ -1,4 +1,5 @@
-//! The multifrontal factorisation against faer's, on positive definite element matrices.
+//! This module compares the multifrontal factorisation with faer's, for positive definite element
+//! matrices.
 
 use super::faer_llt::FaerLlt;
 use super::{Outcome, least, on_threads};
@@ -11,15 +12,18 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::Arc;
 
+/// Number of repetitions of each measurement.
 const TIMES: usize = 9;
 
+/// Writes the section of the solver for meshes of `n x n` cells.
 pub fn report(page: &mut String, sizes: &[usize]) -> Outcome<()> {
     writeln!(
         page,
         "## The solver against faer's supernodal LLT\n\n\
-         n x n cells, d unknowns a node, one thread; *changed*: a ring of cells, as an interface \
-         has. Milliseconds, and how many times faster than faer. Two threads: times faster than \
-         one.\n\n\
+         Meshes of n x n cells, d unknowns per node, one thread. *All*: every cell is factored; \
+         *changed*: only a ring of cells, like those of an interface, is factored again. Times in \
+         milliseconds, with the speed-up over faer. The last columns are the speed-up of two \
+         threads over one.\n\n\
          | n, d | faer factor | all | changed (cells) | faer solve | solve | all, 2 threads | \
          solve, 2 threads |\n|---|---|---|---|---|---|---|---|"
     )?;
@@ -31,6 +35,7 @@ pub fn report(page: &mut String, sizes: &[usize]) -> Outcome<()> {
     Ok(())
 }
 
+/// Measures one mesh and writes its row.
 fn row<const D: usize>(page: &mut String, n: usize) -> Outcome<()> {
     let mesh = mesh(n);
     let tree = Arc::new(Tree::new(&mesh));
@@ -108,19 +113,20 @@ fn row<const D: usize>(page: &mut String, n: usize) -> Outcome<()> {
     Ok(())
 }
 
+/// A uniform mesh of `n x n` cells on the unit square.
 fn mesh(n: usize) -> Mesh {
     let axis = || Axis::new((0..=n).map(|i| i as f64 / n as f64).collect(), false);
     Mesh::new(axis(), axis())
 }
 
-/// Cells that a circle of radius 0.3 goes through, about.
+/// Whether a circle of radius 0.3 passes through the cell, approximately.
 fn on_ring(mesh: &Mesh, cell: usize) -> bool {
     let [x, y] = mesh.cell_centre(cell);
     let [h, _] = mesh.cell_size(cell);
     ((x - 0.5).hypot(y - 0.4) - 0.3).abs() < 0.55 * h
 }
 
-/// `G G' + I` of a random `G`.
+/// The element matrix `G G' + I` for a random `G`.
 fn positive<const D: usize>(rng: &mut impl Rng) -> CellBlocks<D> {
     let n = 8 * D;
     let g: Vec<f64> = (0..n * n).map(|_| rng.random_range(-0.5..0.5)).collect();
@@ -141,6 +147,7 @@ fn positive<const D: usize>(rng: &mut impl Rng) -> CellBlocks<D> {
     out
 }
 
+/// The assembled matrix: entries on and below the diagonal, one map of rows per column.
 fn assembled<const D: usize>(
     mesh: &Mesh,
     tree: &Tree,

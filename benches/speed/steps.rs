@@ -1,14 +1,15 @@
-//! Steps of a scene with a moving interface, by phase, on one thread and on two.
+//! This module measures the steps of a scene with a moving interface, by phase, on one thread and
+//! on two.
 
 use super::machine::Machine;
 use super::{Outcome, exponent, on_threads};
-use grainscope::sim::row::Phases;
+use grainscope::sim::phases::Phases;
 use grainscope::solve::multifrontal::Effort;
 use grainscope::{plan, scene, sim};
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// A dense disc sinks through a thinner fluid; 16 particles a cell.
+/// A scene of a dense disc that sinks through a less viscous fluid, with 16 particles per cell.
 const DROP: &str = r#"
 schema = 1
 name = "drop"
@@ -39,7 +40,7 @@ bottom.kind = "no_slip"
 top.kind = "no_slip"
 "#;
 
-/// Rotation everywhere: three unknowns a node.
+/// Settings that give both materials an internal length: three unknowns per node.
 const WITH_ROTATION: [&str; 4] = [
     "materials.fluid.coupling_viscosity=1",
     "materials.fluid.internal_length=0.1",
@@ -47,13 +48,16 @@ const WITH_ROTATION: [&str; 4] = [
     "materials.drop.internal_length=0.1",
 ];
 
+/// Number of measured steps.
 const STEPS: usize = 5;
-/// Larger meshes take one step, and no part in the growth: they are there to be seen to fit.
+/// Meshes with more cells per side take one step only and are left out of the fit of the growth:
+/// they show that such meshes fit into memory.
 const LARGE: usize = 256;
 
-/// What a mesh took: seconds are the least of some steps.
+/// The measurements of a mesh. Times are those of the fastest of some steps, s.
 struct Measured {
     step: f64,
+    /// Time of a step that factors everything again.
     full_step: f64,
     phases: Phases,
     solves: u32,
@@ -61,14 +65,16 @@ struct Measured {
     effort: Effort,
 }
 
+/// Writes the section of steps for meshes of `n x n` cells.
 pub fn report(page: &mut String, sizes: &[usize], machine: &Machine) -> Outcome<()> {
     writeln!(
         page,
         "## A step\n\n\
-         A dense, 1000 times stiffer disc sinks in a box of n x n cells with 16 particles each; d = 3: \
-         both materials have an internal length. Milliseconds of the fastest of {STEPS} steps (beyond n = {LARGE} of one); \
-         *step*: what changed is factored again, *all*: everything is. The bound counts the solves \
-         that were made and a factorisation of everything.\n\n\
+         A dense, 1000 times stiffer disc sinks in a box of n x n cells, 16 particles each. With \
+         d = 3 both materials have an internal length. Times are milliseconds of the fastest of \
+         {STEPS} steps (of one step beyond n = {LARGE}). *Step*: only changed cells are factored \
+         again; *all*: all cells are. The bound counts the solves that were made and a \
+         factorisation of all cells.\n\n\
          | n, d | solves | factor | solve | other | step | all | bound | step/bound | step, 2 \
          threads | factor MB | kept MB |\n|---|---|---|---|---|---|---|---|---|---|---|---|"
     )?;
@@ -108,8 +114,8 @@ pub fn report(page: &mut String, sizes: &[usize], machine: &Machine) -> Outcome<
         if steps.len() > 1 {
             writeln!(
                 growth,
-                "d = {d}: a step grows as N^{:.2}, with everything factored as N^{:.2}, the \
-                 solver's memory as N^{:.2} from 64 x 64 to {LARGE} x {LARGE} cells.\n",
+                "d = {d}, N cells, from 64 x 64 to {LARGE} x {LARGE}: the time of a step grows as \
+                 N^{:.2}, with all cells factored as N^{:.2}, the solver's memory as N^{:.2}.\n",
                 exponent(&steps),
                 exponent(&fulls),
                 exponent(&memory)
@@ -120,6 +126,7 @@ pub fn report(page: &mut String, sizes: &[usize], machine: &Machine) -> Outcome<
     Ok(())
 }
 
+/// Lower bound of the time of a step, s; its formula is at the top of `benches/speed.rs`.
 fn bound(m: &Measured, machine: &Machine, cells: f64, d: f64) -> f64 {
     let entries = m.effort.all_entries as f64;
     let factor = m.effort.all_flops / machine.product + 8.0 * entries / machine.copy;
@@ -128,6 +135,7 @@ fn bound(m: &Measured, machine: &Machine, cells: f64, d: f64) -> f64 {
     factor + solve + matrices + 100.0 * m.particles as f64 / machine.copy
 }
 
+/// Runs the scene with `n x n` cells and `d` unknowns per node.
 fn measure(n: usize, d: usize) -> Outcome<Measured> {
     let mut sets = vec![format!("accuracy.cells={n}")];
     if d == 3 {
@@ -136,7 +144,8 @@ fn measure(n: usize, d: usize) -> Outcome<Measured> {
     let source = scene::SceneSource::new("drop.toml", DROP).with_sets(&sets)?;
     let plan = plan::resolve(&scene::parse(&source)?).map_err(|e| e.with_source(&source))?;
     let mut run = sim::start(Arc::new(plan))?;
-    // The first step solves twice, and the second has no step before to compare with.
+    // The first two steps are not measured: the first solves twice, and the second has no regular
+    // step before it.
     run.step()?;
     run.step()?;
     let steps = if n > LARGE { 1 } else { STEPS };

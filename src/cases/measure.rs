@@ -121,7 +121,7 @@ impl Errors {
             for (eta, wy) in GAUSS_5 {
                 for (xi, wx) in GAUSS_5 {
                     let p = plan.si(mesh.from_reference(cell, [xi, eta]));
-                    let weight = wx * wy * mesh.cell_area(cell);
+                    let weight = wx * wy * mesh.cell_volume(cell);
                     let (u, e) = (run.velocity_at(p), (exact.velocity)(p[0], p[1]));
                     add(0, weight, u[0] - e[0], e[0]);
                     add(0, weight, u[1] - e[1], e[1]);

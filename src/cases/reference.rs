@@ -2,13 +2,16 @@
 
 use super::Case;
 use super::measure::{CaseError, Errors, Solved};
-use crate::plan::boundary::add_body_force;
-use crate::plan::material::{Material, Texture};
+use crate::laws::Here;
+use crate::laws::director::Orientation;
+use crate::plan::material::Material;
 use crate::plan::{InitialDirector, Plan};
 use crate::sim::SimError;
-use crate::solve::buoyancy::Restoring;
 use crate::solve::quadrature::Quadrature;
-use crate::solve::stokes::{Loads, Stokes, Stopping};
+use crate::solve::report::Stopping;
+use crate::solve::stokes::{Loads, Stokes};
+use crate::solve::terms::Terms;
+use crate::solve::terms::weight::{Masses, add_acceleration, add_gravity};
 use crate::space::flow::Flow;
 
 impl Case {
@@ -48,38 +51,22 @@ fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
         let Some((index, director)) = material_at(plan, si) else { return Default::default() };
         let material = &materials[index];
         let (eta, density) = values(plan, index, material, si);
-        let mut texture = Texture::default();
+        let mut orientation = Orientation::default();
         if let Some(InitialDirector::Angle(f)) = director {
             let (s, c) = f.at(si[0], si[1]).to_radians().sin_cos();
-            texture.add(1.0, [c, s]);
+            orientation.add(1.0, [c, s]);
         }
-        (material.law(eta, &texture), density, eta)
+        (material.law.at(&Here::at_rest(eta, &orientation)), density, eta)
     });
-    let mut load = vec![[0.0; D]; mesh.nodes()];
-    plan.boundary.add_tractions(mesh, &plan.units, &mut load);
-    if let Some(f) = &plan.body_force {
-        add_body_force(mesh, &plan.units, f, &mut load);
-    }
-    let g = plan.state.gravity;
-    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-        let nodes = mesh.cell_nodes(cell);
-        quadrature.for_points(cell, |p, shape| {
-            let si = plan.si(mesh.from_reference(cell, p.r));
-            for c in 0..2 {
-                let more = plan.acceleration.as_ref().map_or(0.0, |a| a[c].at(si[0], si[1]));
-                let acceleration = g[c] + more / plan.units.acceleration();
-                let f = mesh.cell_area(cell) * p.weight * p.density * acceleration;
-                for a in 0..nodes.len() {
-                    load[nodes[a]][c] += f * shape.n[a];
-                }
-            }
-        });
-    }
+    let mut load = plan.fixed_loads::<D>();
+    let masses = Masses::Points(&quadrature);
+    add_acceleration(plan, masses, &mut load);
+    add_gravity(plan, plan.state.gravity, masses, &mut load);
     let constraints = plan.boundary.constraints::<D>(mesh, &plan.units);
     let mut stokes = Stokes::new(mesh.clone(), constraints);
     let stopping =
         Stopping { tolerance: plan.method.tolerance, max_corrections: plan.method.max_corrections };
-    let loads = Loads { nodal: &load, restoring: &Restoring::default() };
+    let loads = Loads { nodal: &load, terms: &Terms::default() };
     let mut flow = Flow::zero(mesh);
     stokes.solve(&quadrature, loads, stopping, &mut flow).map_err(|source| SimError::Solve {
         step: 0,

@@ -1,8 +1,9 @@
-//! `grainscope check`: validate a scene and do nothing else.
+//! This module implements `grainscope check`: it validates a scene without running it.
 
 use super::{Failure, print, tell};
 use crate::sim;
 
+/// Validate a scene without running it.
 #[derive(clap::Args)]
 pub struct Args {
     /// Preset name or path of a TOML file
@@ -12,10 +13,11 @@ pub struct Args {
     sets: Vec<String>,
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
     let (scene, plan) = super::resolve(&source)?;
-    // Another machine may have the memory.
+    // This is only a warning, because another machine may have more memory.
     if let Err(Failure::Environment(text)) = super::memory::afford(&plan) {
         tell(format_args!("warning: {text}"));
     }

@@ -1,4 +1,4 @@
-//! `grainscope compare`: runs side by side, in numbers and in one recording.
+//! This module implements `grainscope compare`: runs side by side, in numbers and in one recording.
 
 use super::{Failure, print};
 use crate::compare::{self, CompareError, Comparison, Member, Tolerance};
@@ -9,24 +9,24 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Compare runs: values, curves, fields and scenes, and one recording side by side.
 ///
-/// A run is the folder that `run` has left, one of its files, a recording alone (.rrd) or a
-/// summary alone (.json). All are compared with the first one.
+/// A run is given as the folder that `run` wrote, as one of its files, as a recording (.rrd) or as
+/// a summary (.json). All are compared with the first one.
 #[derive(clap::Args)]
 pub struct Args {
     /// Folders of runs, recordings or summaries
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
-    /// The recording; plots are written beside it [default: comparisons/<names>/compare.rrd]
+    /// Path of the recording; plots go to its folder [default: comparisons/<names>/compare.rrd]
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
     /// Write no recording and no plots
     #[arg(long, conflicts_with_all = ["output", "serve", "open"])]
     no_output: bool,
-    /// Exit with 6 if a value is further from the first run's: outflow_volume=1%, or =1e-3 in its
-    /// unit; several may be given
+    /// Exit with 6 if a value differs by more from that of the first run: outflow_volume=1%, or
+    /// =1e-3 in its unit; may be repeated
     #[arg(long = "tolerance", value_name = "KEY=AMOUNT")]
     tolerances: Vec<Tolerance>,
-    /// Print everything as JSON
+    /// Print the comparison as JSON
     #[arg(long)]
     json: bool,
     /// Serve the viewer with the recording on 127.0.0.1 until interrupted
@@ -35,7 +35,7 @@ pub struct Args {
     /// Port of the served page; 0 takes any free one
     #[arg(long, value_name = "PORT", default_value_t = 0)]
     port: u16,
-    /// Serve, and open the page in the browser
+    /// Serve the viewer and open it in the browser
     #[arg(long)]
     open: bool,
 }
@@ -50,6 +50,7 @@ impl From<CompareError> for Failure {
     }
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let members = compare::open_all(&args.runs)?;
     let found = compare::compare(&members, &args.tolerances)?;
@@ -82,7 +83,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// Writes recording and plots.
+/// Writes the recording and the plots. Returns the comparison with the names of the files, and the
+/// served viewer if there is one.
 pub(super) fn write(
     found: compare::Found,
     members: &[Member],
@@ -108,7 +110,7 @@ pub(super) fn write(
     Ok((comparison, served))
 }
 
-/// A folder of its own for each set of runs; comparing again overwrites.
+/// Default path of the recording: one folder per set of runs, overwritten by the next comparison.
 fn default_output(members: &[Member]) -> PathBuf {
     const LONGEST: usize = 80;
     let names: Vec<String> = members
@@ -119,6 +121,7 @@ fn default_output(members: &[Member]) -> PathBuf {
     Path::new("comparisons").join(folder).join("compare.rrd")
 }
 
+/// Prints the address of the viewer, and waits for an interrupt.
 fn show(served: &Served, open: bool) {
     let url = served.url();
     eprintln!("viewer: {url} (Ctrl-C ends)");

@@ -1,4 +1,4 @@
-//! `grainscope cost`: what accuracy costs on this machine.
+//! This module implements `grainscope cost`: error and time of settings on this machine.
 
 use super::{Failure, print};
 use crate::cost::measure::{self, Target};
@@ -10,10 +10,11 @@ use crate::record::rerun_log::{Race, RecordError};
 use crate::scene::{SceneSource, parse, scene_hash};
 use std::path::{Path, PathBuf};
 
-/// Measure what accuracy costs: a price list of settings.
+/// Measure error and time of the accuracy settings of a scene.
 ///
-/// Varies the settings that buy accuracy, measures error and time of each, and prints those that
-/// nothing beats. `run --accuracy` and `run --budget` buy from the list.
+/// The command varies the settings that affect accuracy, measures error and time of each, and
+/// prints those that no other setting beats in both. `run --accuracy` and `run --budget` choose
+/// from this table.
 #[derive(clap::Args)]
 pub struct Args {
     /// Preset name or path of a TOML file
@@ -21,22 +22,22 @@ pub struct Args {
     /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-    /// Under two minutes: shortened runs, few combinations
+    /// Use shortened runs and few combinations, in less than two minutes
     #[arg(long)]
     quick: bool,
-    /// Measure anew, even if a list of this scene, program and machine is kept
+    /// Measure again, even if a table of this scene, program and machine is stored
     #[arg(long)]
     fresh: bool,
-    /// Print the list as JSON
+    /// Print the table as JSON
     #[arg(long)]
     json: bool,
-    /// Folder of tables, plots and the race [default: costs/<scene name>]
+    /// Folder of tables, plots and recording [default: costs/<scene name>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Record no race
+    /// Write no recording
     #[arg(long)]
     no_recording: bool,
-    /// Write the list into the page FOLDER/cost.md, in place of an older one of this scene
+    /// Write the table into the page FOLDER/cost.md, replacing an older one of this scene
     #[arg(long, value_name = "FOLDER")]
     write: Option<PathBuf>,
 }
@@ -51,6 +52,7 @@ impl From<CostError> for Failure {
     }
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
     let (scene, _) = super::resolve(&source)?;
@@ -58,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let kept = if args.fresh { None } else { kept(&source, effort)? };
     let list = match kept {
         Some(list) => {
-            eprintln!("this list was kept from before; --fresh measures anew");
+            eprintln!("this table was kept from before; --fresh measures again");
             list
         }
         None => made(&source, effort)?,
@@ -78,22 +80,24 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
+/// The table as JSON.
 fn json(list: &List) -> Result<String, Failure> {
     serde_json::to_string_pretty(list).map_err(|e| Failure::Environment(e.to_string()))
 }
 
-/// The file that a list is kept in; `None` where there is no home.
+/// The file in which a table is stored; `None` if there is no home folder.
 fn file(source: &SceneSource, effort: Effort) -> Result<Option<PathBuf>, Failure> {
     let scene = parse(source)?;
     let name = list::file_name(&scene.name, &scene_hash(&scene), effort == Effort::Quick);
     Ok(list::folder().map(|folder| folder.join(name)))
 }
 
+/// The stored table of a scene, if there is one.
 fn kept(source: &SceneSource, effort: Effort) -> Result<Option<List>, Failure> {
     Ok(list::kept(&parse(source)?, effort == Effort::Quick))
 }
 
-/// Makes a list and keeps it.
+/// Makes a table and stores it.
 fn made(source: &SceneSource, effort: Effort) -> Result<List, Failure> {
     let mut machine = Machine::here();
     let pin = Pin::new();
@@ -101,32 +105,36 @@ fn made(source: &SceneSource, effort: Effort) -> Result<List, Failure> {
     let list = cost::price(source, effort, machine, &mut |line| eprintln!("{line}"))?;
     drop(pin);
     if let Some(path) = file(source, effort)? {
-        // A list that cannot be kept is still a list.
+        // A table that cannot be stored can still be used.
         if let Err(e) = list::store(&path, &list) {
-            eprintln!("warning: the list cannot be kept in {}: {e}", path.display());
+            eprintln!("warning: the table cannot be stored in {}: {e}", path.display());
         }
     }
     Ok(list)
 }
 
-/// The list to buy from: a full one if there is, else a quick one, made now if need be.
+/// The table to choose settings from: a stored full one, else a stored quick one, else a new quick
+/// one.
 pub fn to_buy_from(source: &SceneSource) -> Result<List, Failure> {
     for effort in [Effort::Full, Effort::Quick] {
         if let Some(list) = kept(source, effort)? {
             return Ok(list);
         }
     }
-    eprintln!("there is no price list of this scene, program and machine yet: making a quick one");
+    eprintln!("there is no cost table of this scene, program and machine yet: making a quick one");
     let list = made(source, Effort::Quick)?;
     eprintln!("made in {}", report::seconds(list.made_in));
     Ok(list)
 }
 
-/// This thread, held to one processor while runs are measured: moving between processors empties
-/// caches. The system's own tool does it, where there is one; without it nothing is held.
+/// Pins this thread to one processor while runs are measured, since moving between processors
+/// empties caches. It uses the system tool `taskset`; without that tool the thread is not pinned.
 struct Pin {
+    /// Id of the thread.
     thread: String,
+    /// Processors allowed before.
     before: String,
+    /// Processor to which the thread is pinned.
     processor: String,
 }
 
@@ -138,7 +146,7 @@ impl Pin {
             Some(line.split_once(':')?.1.trim().to_string())
         };
         let (thread, before) = (field("Pid")?, field("Cpus_allowed_list")?);
-        // The last one: the first serves most interrupts.
+        // The last processor is used: the first one handles most interrupts.
         let processor = before.rsplit([',', '-']).next()?.to_string();
         let pin = Pin { thread, before, processor };
         pin.hold(&pin.processor).then_some(pin)
@@ -157,7 +165,7 @@ impl Drop for Pin {
     }
 }
 
-/// Writes table, list and plot.
+/// Writes the table in all formats, and its plot.
 fn write(folder: &Path, list: &List) -> Result<(), Failure> {
     let cannot = |path: &Path, e: std::io::Error| {
         Failure::Environment(format!("cannot write {}: {e}", path.display()))
@@ -175,20 +183,20 @@ fn write(folder: &Path, list: &List) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Work and precision: error against seconds of the processor.
+/// Work-precision plot: relative error against processor time.
 fn plot(list: &List) -> PlotSpec {
     let points = |entries: Vec<&cost::Entry>| -> Vec<(f64, f64)> {
         entries.into_iter().map(|e| (e.cpu, e.promised)).collect()
     };
-    // A line between points that have no order would say nothing: gaps keep them apart.
+    // These points have no order: gaps prevent lines between them.
     let apart = |entries: Vec<&cost::Entry>| -> Vec<(f64, f64)> {
         points(entries).into_iter().flat_map(|p| [p, (f64::NAN, f64::NAN)]).collect()
     };
     let curve = |name: &str, points| Curve { name: name.into(), points, marks: true };
     let mut curves = vec![
-        curve("nothing beats these", points(list.front().collect())),
+        curve("best settings", points(list.front().collect())),
         curve("dominated", apart(list.dominated())),
-        curve("as the scene says", points(list.entries.iter().take(1).collect())),
+        curve("settings of the scene", points(list.entries.iter().take(1).collect())),
     ];
     if list.reference.uncertainty > 0.0 {
         let seconds = list.entries.iter().map(|e| e.cpu);
@@ -205,14 +213,14 @@ fn plot(list: &List) -> PlotSpec {
     }
 }
 
-/// Most runs side by side: more are too small to see.
+/// Largest number of runs side by side: more are too small to see.
 const LANES: usize = 4;
 
-/// Most pictures of a run.
+/// Largest number of frames of a run.
 const PICTURES: u64 = 60;
 
-/// Runs members of the front once more and records them side by side, each at the seconds it had
-/// taken: one sees what accuracy costs.
+/// Runs some of the best settings again and records them side by side, each frame at the time at
+/// which it was computed.
 fn race(source: &SceneSource, list: &List, path: &Path) -> Result<(), Failure> {
     let source = source.with_sets(&list.shortened)?;
     let target = Target::of(&parse(&source)?)?;

@@ -1,4 +1,4 @@
-//! `grainscope doctor`: what a bug report needs.
+//! This module implements `grainscope doctor`: it prints what a bug report needs.
 
 use super::{Failure, print};
 use crate::cost::Machine;
@@ -10,16 +10,18 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
 use std::process::Command;
 
+/// Print versions, processor, memory, disk, viewer and ports, for a bug report.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder whose disk is asked about
+    /// Folder whose disk space and permissions are checked
     #[arg(long, value_name = "DIR", default_value = ".")]
     dir: PathBuf,
-    /// Print JSON
+    /// Print the facts as JSON
     #[arg(long)]
     json: bool,
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let facts = facts(args);
     if args.json {
@@ -31,12 +33,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     print(&lines.join("\n"))
 }
 
+/// All facts, by name.
 fn facts(args: &Args) -> IndexMap<&'static str, String> {
     let machine = Machine::here();
     let mut system = sysinfo::System::new();
     system.refresh_memory();
     let memory = format!(
-        "{} in all, {} left for this program",
+        "{} in total, {} available to this program",
         size(system.total_memory() as f64),
         available().map_or("unknown".into(), size)
     );
@@ -60,7 +63,8 @@ fn facts(args: &Args) -> IndexMap<&'static str, String> {
     .collect()
 }
 
-/// What decides which instructions are used, and so the last bits of results.
+/// Features of the processor that decide which instructions are used. The last digits of results
+/// depend on them.
 fn processor_features() -> Vec<&'static str> {
     let mut found = Vec::new();
     #[cfg(target_arch = "x86_64")]
@@ -88,11 +92,12 @@ fn vectors() -> String {
     format!("{}, though this processor has {}", used.name(), best.name())
 }
 
+/// Number of threads that the system offers.
 fn threads() -> String {
     std::thread::available_parallelism().map_or("unknown".into(), |n| n.to_string())
 }
 
-/// Free space, as `df` has it.
+/// Free disk space, as reported by `df`.
 fn disk(args: &Args) -> String {
     let said = Command::new("df").arg("-Pk").arg(&args.dir).output();
     let text = said.map(|o| String::from_utf8_lossy(&o.stdout).into_owned()).unwrap_or_default();
@@ -101,7 +106,7 @@ fn disk(args: &Args) -> String {
     free.map_or("unknown".into(), |kb| format!("{} free", size(kb * 1024.0)))
 }
 
-/// Whether files can be made there.
+/// Whether files can be written in the folder.
 fn folder(args: &Args) -> String {
     let probe = args.dir.join(".grainscope-probe");
     let shown = std::path::absolute(&args.dir).unwrap_or_else(|_| args.dir.clone());
@@ -111,18 +116,19 @@ fn folder(args: &Args) -> String {
     }
 }
 
+/// The viewers that can be used.
 fn viewer() -> String {
-    let inside = "inside the program (--serve)";
+    let inside = "part of the program (--serve)";
     match Command::new("rerun").arg("--version").output() {
         Ok(said) if said.status.success() => {
             let version = String::from_utf8_lossy(&said.stdout);
-            format!("{inside}; on the path: {}", version.lines().next().unwrap_or_default())
+            format!("{inside}; on the PATH: {}", version.lines().next().unwrap_or_default())
         }
-        _ => format!("{inside}; no `rerun` on the path for --spawn"),
+        _ => format!("{inside}; no `rerun` on the PATH for --spawn"),
     }
 }
 
-/// Whether the ports of pages and data can be had.
+/// Whether the ports for pages and data are free.
 fn ports() -> String {
     let free = |port| match TcpListener::bind((Ipv4Addr::LOCALHOST, port)) {
         Ok(_) => "free".to_string(),

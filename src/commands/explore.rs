@@ -1,4 +1,4 @@
-//! `grainscope explore`: a page to turn the knobs while it flows.
+//! This module implements `grainscope explore`: a page to change parameters while the fluid flows.
 
 use super::Failure;
 use crate::explorer::{Explorer, ExplorerError, Settings};
@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Turn the knobs while it flows: opens a page in your browser.
+/// Change parameters while the fluid flows, in a page of your browser.
 ///
-/// The page is served from this process to this machine only, under an address with a random
-/// token. Closing the page does not end the run; Ctrl-C, or "Quit" in the page, does.
+/// This process serves the page to this machine only, under an address with a random token. Closing
+/// the page does not end the run; Ctrl-C, or "Quit" in the page, does.
 #[derive(clap::Args)]
 pub struct Args {
     /// Preset name or path of a TOML file
@@ -21,7 +21,7 @@ pub struct Args {
     /// Open the page in the browser
     #[arg(long)]
     open: bool,
-    /// Stand at the first instant until told to run
+    /// Start paused, before the first step
     #[arg(long)]
     paused: bool,
     /// Port of the page; 0 takes any free one
@@ -30,7 +30,7 @@ pub struct Args {
     /// Folder whose scenes are offered beside the presets
     #[arg(long, value_name = "DIR", default_value = ".")]
     dir: PathBuf,
-    /// Folder that saved runs go to
+    /// Folder of saved runs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
 }
@@ -41,12 +41,13 @@ impl From<ExplorerError> for Failure {
     }
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (scene, from_file) = super::find(&args.scene)?;
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = interrupted.clone();
     let watching = ctrlc::set_handler(move || {
-        // The first one lets the step end, the second one does not wait.
+        // The first interrupt waits for the end of the step, the second one does not.
         if flag.swap(true, Ordering::SeqCst) {
             std::process::exit(0);
         }
@@ -65,7 +66,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         interrupted,
     })?;
     super::print(&explorer.url)?;
-    eprintln!("open it in a browser; Ctrl-C ends");
+    eprintln!("open this address in a browser; Ctrl-C ends the program");
     if args.open
         && let Err(e) = webbrowser::open(&explorer.url)
     {

@@ -1,4 +1,5 @@
-//! `grainscope export`: the pictures of a recording for other programs.
+//! This module implements `grainscope export`: it converts the frames of a recording for other
+//! programs.
 
 use super::{Failure, print};
 use crate::export::{self, ExportError, Format};
@@ -12,7 +13,7 @@ pub struct Args {
     /// vtu: VTK files and .pvd series that ParaView opens; csv: tables
     #[arg(long, value_enum)]
     format: FormatName,
-    /// Folder of the files [default: <folder of the run>/<format>]
+    /// Folder of the output [default: <folder of the run>/<format>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -32,6 +33,7 @@ impl From<ExportError> for Failure {
     }
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let film = export::read(&args.run)?;
     let (format, name) = match args.format {

@@ -1,4 +1,4 @@
-//! `grainscope figure`: the source's figures, one command each.
+//! This module implements `grainscope figure`: the figures of the source paper, one command each.
 
 use super::{Failure, compare as comparison, print, run};
 use crate::compare;
@@ -18,21 +18,21 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// Runs at once: more do not fit into the caches of small machines.
+/// Number of runs at once: more do not fit into the caches of small machines.
 const AT_ONCE: usize = 2;
 
-/// Parts of a run that the progress bar counts.
+/// Number of units of the progress bar per run.
 const PARTS: f64 = 1000.0;
 
-/// Make a figure of the source: runs, plots, sheets of snapshots, and a recording side by side.
+/// Make a figure of the source paper: runs, plots, snapshots, and a recording side by side.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Which figure
+    /// Figure to make
     figure: Name,
-    /// Coarse and short, in seconds instead of minutes: to see whether it works
+    /// Use coarse meshes and few frames, as a test: seconds instead of minutes
     #[arg(long)]
     quick: bool,
-    /// Folder of what is made [default: figures/<name>]
+    /// Folder of the output [default: figures/<name>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Overwrite runs that are already in the folder
@@ -48,25 +48,30 @@ enum Name {
     Alignment,
 }
 
-/// What a figure consists of.
+/// Definition of a figure.
 struct Figure {
+    /// Name of the figure and of its folder.
     name: &'static str,
+    /// Name of the preset that is run.
     preset: &'static str,
+    /// Title of the sheet of snapshots.
     title: &'static str,
-    /// The sweep that the runs are of, and how what it varies is named; without, there is one run.
+    /// Name of the sweep that gives the runs, and symbol of the quantity that it varies; `None` for
+    /// a single run.
     sweep: Option<(&'static str, &'static str)>,
-    /// The name of that one.
+    /// Label of the single run.
     single: &'static str,
     /// Settings of all runs.
     sets: &'static [&'static str],
+    /// Additional settings with `--quick`.
     quick: &'static [&'static str],
-    /// Snapshots (s).
+    /// Times of the snapshots, s.
     times: &'static [f64],
-    /// The sheet's name.
+    /// File name of the sheet of snapshots.
     sheet: &'static str,
 }
 
-/// R/a of 0 to 10/3, as in the source's Fig. 3; snapshots at the times of its Fig. 1.
+/// Figs. 1 and 3 of the source: R/a from 0 to 10/3, with snapshots at the times of Fig. 1.
 const SILO: Figure = Figure {
     name: "silo",
     preset: "silo",
@@ -79,7 +84,8 @@ const SILO: Figure = Figure {
     sheet: "snapshots",
 };
 
-/// Times at which the dyed line has sheared by about a half, two, and many times the height.
+/// Fig. 4 of the source. At the three times the dyed line is sheared by about a half, two, and many
+/// times the height.
 const ALIGNMENT: Figure = Figure {
     name: "alignment",
     preset: "shear_alignment",
@@ -101,13 +107,14 @@ impl Name {
     }
 }
 
-/// A run that is to be made.
+/// A run of the figure.
 struct Job {
     name: String,
     plan: Arc<Plan>,
     folder: PathBuf,
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let figure = args.figure.figure();
     let out = args.out.clone().unwrap_or_else(|| Path::new("figures").join(figure.name));
@@ -141,7 +148,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     print(&format!("{said}in {}", duration(clock.elapsed().as_secs_f64())))
 }
 
-/// Plans and folders of all runs: what is wrong with one is told before anything is computed.
+/// Makes plans and folders of all runs. Errors are reported before anything is computed.
 fn jobs(figure: &Figure, args: &Args, out: &Path) -> Result<Vec<Job>, Failure> {
     let source = presets::find(figure.preset)?;
     let quick: &[&str] = if args.quick { figure.quick } else { &[] };
@@ -155,7 +162,7 @@ fn jobs(figure: &Figure, args: &Args, out: &Path) -> Result<Vec<Job>, Failure> {
     Ok(jobs)
 }
 
-/// Names, folders and settings of the runs: those of the figure's sweep.
+/// Names, folders and settings of the runs, taken from the sweep of the figure.
 fn cases(figure: &Figure, quick: bool) -> Result<Vec<(String, String, Vec<String>)>, Failure> {
     let Some((sweep, symbol)) = figure.sweep else {
         return Ok(vec![(figure.single.into(), "run".into(), vec![])]);
@@ -172,7 +179,8 @@ fn cases(figure: &Figure, quick: bool) -> Result<Vec<(String, String, Vec<String
     list.cases.iter().map(named).collect()
 }
 
-/// Runs everything, some at once; pictures of each run at the figure's times.
+/// Makes all runs, [`AT_ONCE`] in parallel. Returns the frames of each run at the times of the
+/// figure.
 fn run_all(figure: &Figure, jobs: &[Job]) -> Result<Vec<Vec<Picture>>, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     run::watch_interrupts(&interrupted);
@@ -195,7 +203,8 @@ fn run_all(figure: &Figure, jobs: &[Job]) -> Result<Vec<Vec<Picture>>, Failure> 
                             done.lock().unwrap_or_else(PoisonError::into_inner)[k] = Some(pictures);
                         }
                         Err(e) => {
-                            // One fault ends the others after their steps; the first one is told.
+                            // A fault ends the other runs after their current step. The first
+                            // fault is reported.
                             interrupted.store(true, Ordering::SeqCst);
                             fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(e);
                             return;
@@ -215,13 +224,13 @@ fn run_all(figure: &Figure, jobs: &[Job]) -> Result<Vec<Vec<Picture>>, Failure> 
     }
 }
 
-/// The next job that nobody has taken.
+/// The next job, or `None` if all are taken.
 fn take<'a>(next: &AtomicUsize, jobs: &'a [Job]) -> Option<(usize, &'a Job)> {
     let k = next.fetch_add(1, Ordering::SeqCst);
     Some((k, jobs.get(k)?))
 }
 
-/// One run and its pictures.
+/// Makes one run. Returns its frames at the times of the figure.
 fn make(
     figure: &Figure,
     job: &Job,
@@ -249,7 +258,7 @@ fn make(
     Ok(pictures)
 }
 
-/// Compares all runs with the first one.
+/// Compares all runs with the first one, and writes the recording. Returns the text to print.
 fn side_by_side(jobs: &[Job], path: &Path) -> Result<String, Failure> {
     let folders: Vec<PathBuf> = jobs.iter().map(|job| job.folder.clone()).collect();
     let mut members = compare::open_all(&folders)?;

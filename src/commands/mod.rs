@@ -1,4 +1,4 @@
-//! The command line: the top floor, which nothing imports.
+//! This module is the command line, the top layer of the crate. No other module imports it.
 
 mod check;
 mod compare;
@@ -33,25 +33,31 @@ use std::process::ExitCode;
 
 /// Exit codes, as documented in `--help`.
 mod code {
+    /// The command line is wrong.
     pub const USAGE: u8 = 2;
+    /// The scene is invalid.
     pub const SCENE: u8 = 3;
+    /// A solution did not converge.
     pub const NOT_CONVERGED: u8 = 4;
+    /// A value is not finite.
     pub const NON_FINITE: u8 = 5;
+    /// A comparison differs or a check fails.
     pub const DIFFERS: u8 = 6;
+    /// The program was interrupted.
     pub const INTERRUPTED: u8 = 130;
-    /// Files, ports, viewers.
+    /// A file, port or viewer cannot be used, or memory is too small.
     pub const ENVIRONMENT: u8 = 1;
 }
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0    ok
-  1    a file, folder, port, viewer or memory cannot be had
-  2    usage
+  0    success
+  1    a file, folder, port or viewer cannot be used, or memory is too small
+  2    usage error
   3    the scene is invalid
   4    not converged
   5    not finite
-  6    a comparison differs, a check fails
+  6    a comparison differs or a check fails
   130  interrupted";
 
 const EXAMPLES: &str = "\
@@ -59,29 +65,30 @@ Examples:
   grainscope run silo                                   discharge of a silo, recorded
   grainscope run presets/silo.toml --set alpha=5/3 --out runs/stiff
   grainscope run shear_alignment --save align.rrd --serve   save and watch at once
-  grainscope compare runs/silo runs/stiff               side by side, and how they differ
+  grainscope compare runs/silo runs/stiff               two runs side by side, and their differences
   grainscope sweep silo --vary alpha=0,1/3,5/3 --repeat-seeds 3   many runs, one table
   grainscope plan silo                                  which effects are solved, and why
   grainscope presets show silo                          the scene as TOML";
 
-/// Look into the flow of grains with microstructure.
+/// Compute and explore the flow of grains with microstructure.
 ///
-/// An implicit Material Point Method for fluids with an internal length (Cosserat) and an
-/// orientation (director); runs are recorded for the Rerun viewer.
+/// The program uses an implicit Material Point Method for fluids with an internal length (Cosserat)
+/// and an orientation (director). Runs are recorded for the Rerun viewer.
 #[derive(Parser)]
 #[command(version, after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Threads that compute, by default one per processor; no result depends on them
+    /// Number of threads, by default one per processor; no result depends on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// The instruction set that our own kernels use, by default the best that the processor has; results
-    /// differ in their last digits between sets
+    /// Instruction set of our own kernels, by default the best that the processor has; results of
+    /// different sets differ in their last digits
     #[arg(long, global = true, value_name = "SET", value_parser = instruction_set)]
     simd: Option<Simd>,
 }
 
+/// Reads the name of an instruction set.
 fn instruction_set(name: &str) -> Result<Simd, String> {
     let found = Simd::NAMES.iter().find(|named| named.0 == name);
     let names = || Simd::NAMES.iter().map(|named| named.0).collect::<Vec<_>>().join(", ");
@@ -90,35 +97,35 @@ fn instruction_set(name: &str) -> Result<Simd, String> {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Run a scene: a preset's name or a TOML file
+    /// Run a scene: a preset or a TOML file
     Run(run::Args),
-    /// Go on with a run that ended before its end, for whatever reason
+    /// Continue a run that stopped before its end, for any reason
     Resume(resume::Args),
-    /// Turn the knobs while it flows, in a page of your browser
+    /// Change parameters while the fluid flows, in a page of your browser
     Explore(explore::Args),
-    /// Say which effects a scene calls for, and what they cost
+    /// Print which effects of a scene are solved, and the time each takes
     Plan(plan::Args),
-    /// Validate a scene and do nothing else
+    /// Validate a scene without running it
     Check(check::Args),
     /// List the presets, or show one
     Presets(presets::Args),
-    /// Measure every case with a known answer, and print what was found
+    /// Measure the error of every case with a known solution, and print the results
     Verify(verify::Args),
     /// Run hostile scenes, and print a verdict for each
     Stress(stress::Args),
-    /// Measure what accuracy costs: a price list of settings
+    /// Measure error and time of the accuracy settings of a scene
     Cost(cost::Args),
-    /// Compare runs: values, curves, fields, scenes, and one recording side by side
+    /// Compare runs: values, curves, fields and scenes, and one recording side by side
     Compare(compare::Args),
     /// Export a recording's particles and fields: VTK files for ParaView, or tables
     Export(export::Args),
     /// Run a scene for many values of its parameters, here or on a cluster
     Sweep(sweep::Args),
-    /// Make a figure of the source: runs, plots, snapshots, a recording side by side
+    /// Make a figure of the source paper: runs, plots, snapshots, a recording side by side
     Figure(figure::Args),
-    /// Close a recording, or the files of a run, whose writer was killed
+    /// Close the recording or the files of a run that was killed
     Repair(repair::Args),
-    /// Print versions, processor, memory, disk, viewer and ports: what a bug report needs
+    /// Print versions, processor, memory, disk, viewer and ports, for a bug report
     Doctor(doctor::Args),
     /// Print the JSON schema of scene files
     Schema,
@@ -128,15 +135,20 @@ enum Command {
     Man,
 }
 
-/// A failed command: what to print, and the exit code.
+/// The failure of a command. It decides the message and the exit code.
 #[derive(Debug)]
 pub enum Failure {
+    /// The scene is invalid.
     Scene(Box<SceneError>),
+    /// The simulation failed.
     Sim(SimError),
+    /// A file, folder, port or viewer cannot be used, or memory is too small; with the message.
     Environment(String),
+    /// The command line is wrong; with the message.
     Usage(String),
+    /// The user interrupted the command.
     Interrupted,
-    /// Checks that did not pass.
+    /// A comparison differs or a check fails; with the message.
     Differs(String),
 }
 
@@ -190,7 +202,7 @@ impl Failure {
 
     fn print(self) {
         match self {
-            // Without a place in the text the drawing would not name the file.
+            // Without a position in the text miette's report would not name the file.
             Failure::Scene(e) if e.span().is_none() => {
                 tell(format_args!("error: {}", e.headline()));
                 if let Some(help) = e.remedy() {
@@ -209,7 +221,7 @@ impl Failure {
     }
 }
 
-/// Reads the arguments, does what they say, and gives the exit code.
+/// Reads the command line, runs the command and returns the exit code.
 pub fn main() -> ExitCode {
     let Cli { command, threads, simd } = Cli::parse();
     let outcome =
@@ -224,12 +236,14 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Sets the number of threads of the global pool, if one is given.
 fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
     let Some(n) = threads else { return Ok(()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n));
     pool.build_global().map_err(|e| Failure::Environment(format!("cannot start {n} threads: {e}")))
 }
 
+/// Sets the instruction set from the option, or else from the environment variable.
 fn set_simd(set: Option<Simd>) -> Result<(), Failure> {
     let by_environment = || {
         let name = std::env::var(simd::VARIABLE).ok()?;
@@ -239,7 +253,7 @@ fn set_simd(set: Option<Simd>) -> Result<(), Failure> {
     let Some(set) = set.map(Ok).or_else(by_environment).transpose()? else { return Ok(()) };
     Simd::limit(set).map_err(|best| {
         let (set, best) = (set.name(), best.name());
-        Failure::Environment(format!("this processor has no {set}: the best it has is {best}"))
+        Failure::Environment(format!("this processor has no {set}; its best set is {best}"))
     })
 }
 
@@ -276,7 +290,7 @@ fn run_command(command: Command) -> Result<(), Failure> {
     }
 }
 
-/// Writes to stdout; a closed pipe is the reader's wish, not a fault.
+/// Writes a text to stdout. A closed pipe is not an error.
 fn print(text: &str) -> Result<(), Failure> {
     use std::io::Write;
     match writeln!(std::io::stdout(), "{}", text.trim_end()) {
@@ -287,18 +301,18 @@ fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Writes a line to stderr; that nobody listens any more is no fault of a run.
+/// Writes a line to stderr. A closed pipe is not an error.
 fn tell(text: impl std::fmt::Display) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// Finds a scene by preset name or path, and applies `--set`s.
+/// Finds a scene by preset name or path, and applies the `--set` options.
 fn source(name: &str, sets: &[String]) -> Result<SceneSource, Failure> {
     Ok(find(name)?.0.with_sets(sets)?)
 }
 
-/// Finds a scene by preset name or path; whether it is a file.
+/// Finds a scene by preset name or path. The flag says whether it is a file.
 fn find(name: &str) -> Result<(SceneSource, bool), Failure> {
     let path = Path::new(name);
     let is_path = path.extension().is_some() || name.contains(['/', '\\']) || path.is_file();
@@ -306,7 +320,7 @@ fn find(name: &str) -> Result<(SceneSource, bool), Failure> {
     Ok((source, is_path))
 }
 
-/// The scene of a source and its plan, errors pointing into the source.
+/// Parses and plans the scene of a source. Errors have positions in the source.
 fn resolve(source: &SceneSource) -> Result<(Scene, crate::plan::Plan), Failure> {
     let scene = scene::parse(source)?;
     let plan = crate::plan::resolve(&scene).map_err(|e| e.with_source(source))?;

@@ -1,4 +1,5 @@
-//! `grainscope plan`: which effects are solved, why, and what each takes of a step.
+//! This module implements `grainscope plan`: which effects are solved, why, and the time each
+//! takes.
 
 use super::memory;
 use super::{Failure, print, tell};
@@ -7,9 +8,10 @@ use crate::plan::memory::Memory;
 use crate::record::text::plan_text;
 use std::sync::Arc;
 
-/// Steps that are measured of each run.
+/// Number of measured steps of each run.
 const STEPS: u32 = 4;
 
+/// Print which effects of a scene are solved, and the time each takes.
 #[derive(clap::Args)]
 pub struct Args {
     /// Preset name or path of a TOML file
@@ -17,14 +19,15 @@ pub struct Args {
     /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-    /// Do not take some steps to measure what each effect takes
+    /// Do not measure the time of each effect
     #[arg(long)]
     no_measure: bool,
-    /// Print JSON
+    /// Print the plan as JSON
     #[arg(long)]
     json: bool,
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
     let (_, plan) = super::resolve(&source)?;
@@ -33,10 +36,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let memory = Memory::of(&plan);
     if !args.no_measure {
         memory::afford(&plan)?;
-        eprintln!("taking some steps to measure what each effect takes (--no-measure skips it)");
+        eprintln!("taking some steps to measure the time of each effect (--no-measure skips this)");
         effects::measure(&plan, &mut list, STEPS)?;
     }
-    tell(format_args!("a run takes about {memory}"));
+    tell(format_args!("a run needs about {memory}"));
     if args.json {
         let text =
             serde_json::to_string_pretty(&list).map_err(|e| Failure::Environment(e.to_string()))?;

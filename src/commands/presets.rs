@@ -1,8 +1,9 @@
-//! `grainscope presets`: the scenes that come with the program.
+//! This module implements `grainscope presets`: it lists the built-in scenes or prints one.
 
 use super::{Failure, print};
 use crate::scene::presets;
 
+/// List the presets, or show one.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -18,6 +19,7 @@ enum Action {
     },
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     match &args.action {
         Some(Action::Show { name }) => print(presets::find(name)?.text()),

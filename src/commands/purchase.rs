@@ -1,4 +1,4 @@
-//! `run --accuracy` and `run --budget`: settings bought from a price list.
+//! This module implements `run --accuracy` and `run --budget`: settings chosen from a cost table.
 
 use super::{Failure, cost};
 use crate::cost::measure::wall_of_a_step;
@@ -9,7 +9,7 @@ use crate::scene::SceneSource;
 use crate::sim::Run;
 use std::time::Instant;
 
-/// Reads `1%`, `0.3 %` or `0.01`.
+/// Reads an accuracy: `1%`, `0.3 %` or `0.01`.
 pub fn accuracy(text: &str) -> Result<f64, String> {
     let (number, unit) = match text.trim().strip_suffix('%') {
         Some(number) => (number, 0.01),
@@ -21,7 +21,7 @@ pub fn accuracy(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Reads `30s`, `500ms`, `2min`, `1.5h` or a number of seconds.
+/// Reads a time: `30s`, `500ms`, `2min`, `1.5h` or a number of seconds. Returns seconds.
 pub fn budget(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let units = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0), ("", 1.0)];
@@ -32,17 +32,20 @@ pub fn budget(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What was bought.
+/// Settings chosen from a cost table.
 pub struct Bought {
+    /// The chosen entry of the table.
     pub entry: Entry,
+    /// The table.
     list: List,
-    /// Seconds of the wall.
+    /// Expected wall time, s.
     expected: f64,
-    /// Seconds, if that was the wish.
+    /// Time budget, s, if one was given.
     budget: Option<f64>,
 }
 
-/// Buys settings, says what is expected of them, and refuses what is out of reach.
+/// Chooses settings and prints their expected error and time. Returns a failure if no settings
+/// reach the accuracy or the budget, and `None` if neither is given.
 pub fn buy(
     source: &SceneSource,
     accuracy: Option<f64>,
@@ -56,22 +59,22 @@ pub fn buy(
     let expected = |e: &Entry| pace * list.expected_seconds(e);
     let entry = match (accuracy, budget) {
         (Some(wanted), _) => list.for_accuracy(wanted).map_err(|best| {
-            let best = best.map_or("there is nothing to buy".into(), |e| {
+            let best = best.map_or("the table is empty".into(), |e| {
                 format!(
-                    "the best is {} for about {}: {}",
+                    "the best is {} in about {}: {}",
                     percent(e.promised),
                     seconds(expected(e)),
                     e.label
                 )
             });
             let finer =
-                if list.quick { "; without --quick `grainscope cost` looks further" } else { "" };
+                if list.quick { "; `grainscope cost` without --quick may reach it" } else { "" };
             format!("an accuracy of {} is out of reach; {best}{finer}", percent(wanted))
         }),
         (None, wanted) => {
             let wanted = wanted.unwrap_or(f64::INFINITY);
             list.for_budget(wanted, pace).map_err(|fastest| {
-                let fastest = fastest.map_or("there is nothing to buy".into(), |e| {
+                let fastest = fastest.map_or("the table is empty".into(), |e| {
                     format!(
                         "the fastest takes about {} for {}: {}",
                         seconds(expected(e)),
@@ -85,7 +88,7 @@ pub fn buy(
     };
     let entry = entry.map_err(Failure::Usage)?.clone();
     eprintln!(
-        "bought: {}; expects {} within {} (limited by {}{}), in about {}",
+        "chosen settings: {}; expects {} within {} (limited by {}{}), in about {}",
         entry.label,
         list.quantity,
         percent(entry.promised),
@@ -96,38 +99,38 @@ pub fn buy(
     Ok(Some(Bought { expected: expected(&entry), entry, list, budget }))
 }
 
-/// Seconds of a few steps.
+/// Time spent on measuring a few steps, s.
 const PATIENCE: f64 = 0.5;
 
-/// How many times longer a step takes now than a processor took when the list was made: other work
-/// on the machine, another frequency; more threads make it less.
+/// Wall time of a step now, divided by its processor time when the table was made. Other load on
+/// the machine or a lower frequency increase it; more threads decrease it.
 fn pace(source: &SceneSource, list: &List) -> Result<f64, Failure> {
     let Some(entry) = list.front().next() else { return Ok(1.0) };
     let (_, plan) = super::resolve(&source.with_sets(&entry.sets)?)?;
     let now = wall_of_a_step(std::sync::Arc::new(plan), PATIENCE)?;
     let then = list.step_seconds(entry);
-    // Of runs that are a start and little more, steps say nothing.
+    // Steps of runs that are dominated by the start are not representative.
     let known = now > 0.0 && then > 0.0 && entry.steps >= LEAST_STEPS;
     Ok(if known { now / then } else { 1.0 })
 }
 
-/// Fewest steps of an entry that tell its pace.
+/// Smallest number of steps of an entry for which the time of a step is compared.
 const LEAST_STEPS: u64 = 5;
 
 impl Bought {
-    /// Whether a further step, as long as the last one, would exceed the budget. Closing the files
-    /// takes some time too.
+    /// Whether one more step, as long as the last one, would exceed the budget. The time to close
+    /// the files is not counted.
     pub fn is_spent(&self, clock: &Instant, step: f64) -> bool {
         self.budget.is_some_and(|b| clock.elapsed().as_secs_f64() + step > b)
     }
 
-    /// What was expected and what came.
+    /// Expected and actual results of a run, for the summary.
     pub fn receipt(&self, run: &dyn Run, wall: f64) -> Purchase {
         let gauges = run.plan().gauges.iter().zip(&run.row().gauges).enumerate();
         let bars = gauges.map(|(k, (plan, now))| {
             let line = self.list.gauges.get(k);
             let measured = self.entry.gauge_errors.get(k).copied();
-            // The gauge that the list is about has what was promised of it.
+            // The gauge whose error the table lists has the error of the entry.
             let error = match (line, measured) {
                 (Some(l), Some(e)) if !l.priced => e + l.uncertainty,
                 _ => self.entry.promised,
@@ -149,10 +152,10 @@ impl Bought {
     }
 }
 
-/// What was bought, at the end of a run's report.
+/// The chosen settings and their results, for the end of a run's report.
 pub fn receipt_text(p: &Purchase) -> String {
     let mut out = format!(
-        "  bought {}: {} within {}; expected {}, took {}\n",
+        "  settings {}: {} within {}; expected {}, took {}\n",
         p.settings,
         p.quantity,
         percent(p.accuracy),
@@ -160,8 +163,8 @@ pub fn receipt_text(p: &Purchase) -> String {
         seconds(p.seconds)
     );
     if !p.finished {
-        out += "  unfinished: what was bought is promised of a whole run, not of this part of one; a \
-                larger budget, or a shorter time.end, brings it to the end\n";
+        out += "  unfinished: the accuracy holds for a whole run only; use a larger budget or a \
+                shorter time.end\n";
     }
     for (name, [error, sampling]) in &p.bars {
         out += &format!(
@@ -176,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wishes_are_read() {
+    fn accuracies_and_budgets_are_parsed() {
         for (text, value) in [("1%", 0.01), ("0.3 %", 0.003), ("0.02", 0.02)] {
             assert!(accuracy(text).is_ok_and(|v| (v - value).abs() < 1e-15), "{text}");
         }

@@ -1,19 +1,20 @@
-//! `grainscope repair`: closes what a killed run has left open.
+//! This module implements `grainscope repair`: it closes the files of a killed run.
 
 use super::{Failure, print};
 use crate::record::rerun_log::repair;
 use std::path::{Path, PathBuf};
 
-/// Close a recording, or the files of a run, whose writer was killed.
+/// Close the recording or the files of a run that was killed.
 ///
-/// A recording whose end is missing keeps all whole messages and gets its end; a table keeps its
-/// whole rows. What is whole stays as it is. (`grainscope resume` repairs on its own.)
+/// A recording without its end keeps all complete messages and gets an end; a table keeps its
+/// complete rows. Complete files are not changed. (`grainscope resume` repairs by itself.)
 #[derive(clap::Args)]
 pub struct Args {
     /// A recording (.rrd), or the folder of a run
     path: PathBuf,
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let mut told = Vec::new();
     if args.path.is_dir() {
@@ -26,7 +27,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }
         if told.is_empty() {
             let folder = args.path.display();
-            return Err(Failure::Environment(format!("{folder}: is no folder of a run")));
+            return Err(Failure::Environment(format!("{folder}: is not the folder of a run")));
         }
     } else {
         told.push(mend_recording(&args.path)?);
@@ -34,19 +35,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     print(&told.join("\n"))
 }
 
+/// Repairs a recording. Returns the text to print.
 fn mend_recording(path: &Path) -> Result<String, Failure> {
     let (kept, saved) = repair(path).map_err(|e| Failure::Environment(e.to_string()))?;
     let steps = kept.last_step.map_or("no step".into(), |step| format!("steps 0 to {step}"));
     let path = path.display();
     Ok(match saved {
-        None => format!("{path}: is whole, {steps}"),
+        None => format!("{path}: is complete, {steps}"),
         Some(saved) => {
             format!("{path}: repaired, {steps}, {:.1} MB", saved.bytes as f64 / 1e6)
         }
     })
 }
 
-/// Drops what follows the last whole row.
+/// Cuts a table after its last complete row. Returns the text to print.
 fn mend_table(path: &Path) -> Result<String, Failure> {
     let fault = |e: std::io::Error| Failure::Environment(format!("{}: {e}", path.display()));
     let bytes = std::fs::read(path).map_err(fault)?;
@@ -54,7 +56,7 @@ fn mend_table(path: &Path) -> Result<String, Failure> {
     let rows = bytes[..whole].iter().filter(|&&b| b == b'\n').count().saturating_sub(1);
     let path_shown = path.display();
     if whole == bytes.len() {
-        return Ok(format!("{path_shown}: is whole, {rows} rows"));
+        return Ok(format!("{path_shown}: is complete, {rows} rows"));
     }
     let file = std::fs::File::options().write(true).open(path).map_err(fault)?;
     file.set_len(whole as u64).and_then(|()| file.sync_all()).map_err(fault)?;

@@ -1,4 +1,4 @@
-//! `grainscope resume`: goes on with a run that ended before its end, for whatever reason.
+//! This module implements `grainscope resume`: it continues a run that stopped before its end.
 
 use super::run::{self, Session};
 use super::safety::Safety;
@@ -10,15 +10,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Go on with a run that ended before its end, for whatever reason.
+/// Continue a run that stopped before its end, for any reason.
 ///
-/// The run goes on from its newest good checkpoint as if it had never stopped: state, table and
-/// recording become, to the last bit of the state, those of a run that was not interrupted.
+/// The run continues from its newest valid checkpoint: its state is bitwise identical to that of an
+/// uninterrupted run, and table and recording continue without a gap.
 #[derive(clap::Args)]
 pub struct Args {
     /// Folder of the run
     folder: PathBuf,
-    /// Stop after this many steps, counted from the start of the run
+    /// Stop after N steps, counted from the start of the run
     #[arg(long, value_name = "N")]
     pub(super) steps: Option<u64>,
     /// Serve the viewer from this process on 127.0.0.1, while running and after
@@ -37,6 +37,7 @@ pub struct Args {
     pub(super) profile: bool,
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let folder = &args.folder;
     if !folder.is_dir() {
@@ -45,7 +46,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     if is_finished(folder) {
         let folder = folder.display();
-        return print(&format!("{folder}: the run is finished; there is nothing to go on with"));
+        return print(&format!("{folder}: the run is finished; there is nothing to continue"));
     }
     let source = scene::load(folder.join("scene.toml"))?;
     let (scene, plan) = super::resolve(&source)?;
@@ -65,10 +66,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         match opened {
             Ok(session) => {
                 for fault in &faults {
-                    tell(format_args!("warning: {fault}; going on from the one before"));
+                    tell(format_args!("warning: {fault}; using the previous checkpoint"));
                 }
-                tell(format_args!("going on after step {step}"));
-                // It is that of a run which ended earlier.
+                tell(format_args!("continuing after step {step}"));
+                // The old summary describes the earlier part of the run.
                 let _ = std::fs::remove_file(folder.join("summary.json"));
                 return session.go();
             }
@@ -79,12 +80,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let reasons: String = faults.iter().map(|f| format!("\n  {f}")).collect();
     let folder = folder.display();
     Err(Failure::Environment(format!(
-        "{folder}: holds no checkpoint to go on from{reasons}\n  help: `grainscope run \
-         {folder}/scene.toml --out {folder} --force` starts again; --checkpoint-every keeps \
-         states on the way"
+        "{folder}: there is no checkpoint to continue from{reasons}\n  help: `grainscope run \
+         {folder}/scene.toml --out {folder} --force` starts again; --checkpoint-every saves \
+         checkpoints during a run"
     )))
 }
 
+/// Whether the summary in the folder says that the run is finished.
 fn is_finished(folder: &Path) -> bool {
     let summary = std::fs::read_to_string(folder.join("summary.json")).ok();
     let summary = summary.and_then(|t| serde_json::from_str::<serde_json::Value>(&t).ok());

@@ -1,4 +1,5 @@
-//! `grainscope run`: a scene goes in, a recording, tables and plots come out.
+//! This module implements `grainscope run`: it runs a scene and writes a recording, tables and
+//! plots.
 
 use super::purchase::{self, Bought};
 use super::safety::Safety;
@@ -24,6 +25,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// Run a scene: a preset or a TOML file.
 #[derive(clap::Args, Default)]
 pub struct Args {
     /// Preset name or path of a TOML file
@@ -31,10 +33,10 @@ pub struct Args {
     /// Set a parameter (alpha=5/3) or any key (accuracy.cells=16)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-    /// Buy the cheapest settings that reach this accuracy (1%, 0.003) from `grainscope cost`
+    /// Use the fastest settings of the `grainscope cost` table that reach this accuracy (1%, 0.003)
     #[arg(long, value_name = "ERROR", value_parser = purchase::accuracy)]
     accuracy: Option<f64>,
-    /// Buy the most accurate settings that end within this time (30s, 2min); a ceiling
+    /// Use the most accurate settings that finish within this time (30s, 2min), and stop after it
     #[arg(long, value_name = "TIME", value_parser = purchase::budget, conflicts_with = "accuracy")]
     budget: Option<f64>,
     /// Folder of the run [default: runs/<scene name>, numbered if taken]
@@ -43,13 +45,13 @@ pub struct Args {
     /// Overwrite a run that is already in the folder
     #[arg(long)]
     force: bool,
-    /// Stop after this many steps
+    /// Stop after N steps
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
-    /// Stop at this time (s); shortens the scene's time.end
+    /// Stop at this time (s), at most the scene's time.end
     #[arg(long, value_name = "T", conflicts_with_all = ["accuracy", "budget"])]
     until: Option<String>,
-    /// Write the recording here instead of into the folder
+    /// Write the recording to this path instead of the folder
     #[arg(long, value_name = "PATH", conflicts_with = "no_recording")]
     save: Option<PathBuf>,
     /// Write no recording
@@ -61,10 +63,10 @@ pub struct Args {
     /// Port of the served page; 0 takes any free one
     #[arg(long, value_name = "PORT", default_value_t = 0)]
     port: u16,
-    /// Send to a viewer that already listens (rerun+http://127.0.0.1:9876/proxy)
+    /// Send to a running viewer (rerun+http://127.0.0.1:9876/proxy)
     #[arg(long, value_name = "URL")]
     connect: Option<String>,
-    /// Start the rerun viewer found on the PATH
+    /// Start the `rerun` viewer found on the PATH
     #[arg(long)]
     spawn: bool,
     /// Print the summary as JSON on stdout
@@ -75,13 +77,13 @@ pub struct Args {
     profile: bool,
     #[command(flatten)]
     safety: Safety,
-    /// Several runs at once are quiet: what they say would mix.
+    /// Print no messages: those of several runs at once would mix.
     #[arg(skip)]
     quiet: bool,
 }
 
 impl Args {
-    /// Those of a run that goes on.
+    /// The arguments of a resumed run.
     pub(super) fn resumed(args: &resume::Args) -> Args {
         Args {
             steps: args.steps,
@@ -95,6 +97,7 @@ impl Args {
     }
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
     let bought = purchase::buy(&source, args.accuracy, args.budget)?;
@@ -111,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     watch_interrupts(&interrupted);
     let plan = Arc::new(plan);
     memory::afford(&plan)?;
-    // Fills cells and solves once: scenes that cannot start leave no folder behind.
+    // This fills the cells and solves once, so scenes that cannot start leave no folder.
     let clock = Instant::now();
     let run = sim::start(plan.clone())?;
     let folder = folder::create(&scene.name, args.out.as_deref(), args.force)?;
@@ -120,8 +123,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     session.go()
 }
 
-/// Runs a plan into a folder as `run` does, without a word on the terminal; `watch` sees every step,
-/// and the start.
+/// Runs a plan into a folder as `run` does, without messages. `watch` is called at the start and
+/// after every step.
 pub(super) fn into_folder(
     plan: &Arc<Plan>,
     folder: PathBuf,
@@ -139,7 +142,7 @@ pub(super) fn into_folder(
     ended.failure.map_or(Ok(ended.summary), Err)
 }
 
-/// The scene with an earlier end; frames keep their interval.
+/// The scene with an earlier end. The interval between frames is unchanged.
 fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
     let mut scene = crate::scene::parse(source)?;
     let scope = Scope::new(&scene).map_err(|e| e.with_source(source))?;
@@ -166,7 +169,7 @@ fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
     Ok(scene)
 }
 
-/// The first interrupt ends the run after its step; a second one ends the program.
+/// Handles interrupts: the first ends the run after its step, a second ends the program.
 pub(super) fn watch_interrupts(flag: &Arc<AtomicBool>) {
     let flag = flag.clone();
     let watching = ctrlc::set_handler(move || {
@@ -179,27 +182,32 @@ pub(super) fn watch_interrupts(flag: &Arc<AtomicBool>) {
     }
 }
 
-/// A run with everything it writes to.
+/// A run with all its output.
 pub(super) struct Session {
     plan: Arc<Plan>,
     run: Box<dyn Run>,
     folder: PathBuf,
     series: SeriesWriter,
+    /// Path of the recording.
     recording: Option<PathBuf>,
     logger: Option<Logger>,
+    /// Start of this part of the run.
     clock: Instant,
-    /// Seconds, and frames, of the parts of the run before this one.
+    /// Totals of the earlier parts of the run: wall time (s), frames, and time of the logger (s).
     before: (f64, Traffic, f64),
     guard: Guard,
     safety: Safety,
     scene_hash: String,
     /// Step of the last checkpoint.
     kept: Option<u64>,
+    /// Set by an interrupt.
     interrupted: Arc<AtomicBool>,
     tally: Tally,
-    /// The first state was written down.
+    /// Whether the initial state has been written.
     begun: bool,
+    /// Index of the next frame.
     next_frame: usize,
+    /// Largest number of steps.
     steps: Option<u64>,
     json: bool,
     profile: bool,
@@ -207,12 +215,12 @@ pub(super) struct Session {
     bought: Option<Bought>,
 }
 
-/// What is left when all files are closed.
+/// The result of a run after all files are closed.
 struct Ended {
     summary: Summary,
-    /// The summary, as written.
+    /// The summary as written to the file.
     json: String,
-    /// The recording and its size.
+    /// Path of the recording, and its size in bytes.
     recorded: Option<(PathBuf, u64)>,
     served: Option<Served>,
     failure: Option<Failure>,
@@ -220,6 +228,7 @@ struct Ended {
 }
 
 impl Session {
+    /// Opens the output of a new run.
     fn open(
         args: &Args,
         plan: &Arc<Plan>,
@@ -265,8 +274,8 @@ impl Session {
         })
     }
 
-    /// Takes up the run of a folder at a state: the table goes on after its row, the recording after
-    /// its step.
+    /// Continues the run of a folder from a state: the table continues after the row of that state,
+    /// the recording after its step.
     pub(super) fn reopen(
         args: &Args,
         plan: &Arc<Plan>,
@@ -316,12 +325,12 @@ impl Session {
         })
     }
 
-    /// Seconds since the run began, pauses between its parts left out.
+    /// Wall time of all parts of the run, s, without the pauses between them.
     fn wall(&self) -> f64 {
         self.before.0 + self.clock.elapsed().as_secs_f64()
     }
 
-    /// Frames of the whole run, and what the logger spent on them.
+    /// Counts of the frames of all parts of the run, and the logger's time for them, s.
     fn traffic(&self) -> (Traffic, f64) {
         let (_, frames, busy) = self.before;
         match &self.logger {
@@ -333,7 +342,7 @@ impl Session {
         }
     }
 
-    /// Brings table and recording to the disk, then the last good state.
+    /// Syncs table and recording to disk, then writes the last good state.
     fn checkpoint(&mut self) -> Result<(), Failure> {
         if let Some(logger) = &mut self.logger
             && logger.settle().is_err()
@@ -345,6 +354,7 @@ impl Session {
         self.keep_state()
     }
 
+    /// Writes the last good state as a checkpoint.
     fn keep_state(&mut self) -> Result<(), Failure> {
         let step = self.run.row().step;
         let mut state = self.guard.good().clone();
@@ -362,7 +372,7 @@ impl Session {
         Ok(())
     }
 
-    /// Runs on a thread of its own while this one shows progress; then closes all files.
+    /// Runs on a separate thread while this one shows progress; then closes all files.
     pub(super) fn go(mut self) -> Result<(), Failure> {
         let end = self.plan.clock.end * self.plan.units.time;
         let (sender, receiver) = bounded::<(u64, f64)>(1);
@@ -370,7 +380,7 @@ impl Session {
             .name("simulation".into())
             .spawn(move || {
                 let outcome = self.compute(|run| {
-                    // The display may miss steps; it never holds the simulation up.
+                    // The display may miss steps; it never blocks the simulation.
                     let _ = sender.try_send((run.row().step, run.row().time));
                 });
                 (self, outcome)
@@ -396,10 +406,11 @@ impl Session {
         }
     }
 
+    /// Takes the steps, then saves the last state and frame of a run that stopped early.
     fn compute(&mut self, watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
         let outcome = self.steps(watch);
         self.keep_the_end(&outcome);
-        // A run that ends between two frames still shows where it ended.
+        // A run that stops between two frames also records its last state.
         if let (Ok(Ending::StepLimit | Ending::Interrupted | Ending::BudgetSpent), Some(logger)) =
             (&outcome, &mut self.logger)
         {
@@ -408,13 +419,13 @@ impl Session {
                 (row.step, row.time, self.before.0 + self.clock.elapsed().as_secs_f64());
             let picture = Some(self.run.picture());
             let frame = Frame { step, time_s, wall_s, picture, ..Frame::default() };
-            // A logger that is gone says why when it is closed.
+            // A logger that has ended reports its error when it is closed.
             let _ = logger.send(frame);
         }
         outcome
     }
 
-    /// A run that ends before its end leaves the last good state, to be looked at or resumed.
+    /// Saves the last good state of a run that stopped before its end, to be examined or resumed.
     fn keep_the_end(&mut self, outcome: &Result<Ending, Failure>) {
         let wanted = match outcome {
             Ok(Ending::Finished) => false,
@@ -424,14 +435,15 @@ impl Session {
         if !wanted || self.kept == Some(self.run.row().step) {
             return;
         }
-        // What failed may be the recording or the table: the state alone is worth keeping.
+        // Recording or table may have failed: then the state alone is saved.
         if let Err(e) = self.checkpoint().or_else(|_| self.keep_state())
             && let Some(e) = describe(&e)
         {
-            self.note(format!("the last state is not kept: {e}"));
+            self.note(format!("the last state is not saved: {e}"));
         }
     }
 
+    /// Prints a warning and adds it to the summary.
     fn note(&mut self, warning: String) {
         if !self.quiet {
             tell(format_args!("warning: {warning}"));
@@ -439,6 +451,7 @@ impl Session {
         self.tally.warnings.push(warning);
     }
 
+    /// Takes steps until the run ends, for any reason.
     fn steps(&mut self, mut watch: impl FnMut(&dyn Run)) -> Result<Ending, Failure> {
         self.guard.begin(self.run.as_ref())?;
         if !self.begun {
@@ -476,7 +489,7 @@ impl Session {
         Ok(Ending::Finished)
     }
 
-    /// Writes down the current state.
+    /// Writes the current state to table and recording.
     fn observe(&mut self, mut notes: Vec<String>) -> Result<(), Failure> {
         let clock = Instant::now();
         let row = self.run.row().clone();
@@ -499,7 +512,7 @@ impl Session {
         Ok(())
     }
 
-    /// Closes all files and says what there is.
+    /// Closes all files, prints the report, and keeps serving the viewer if there is one.
     fn close(mut self, outcome: Result<Ending, Failure>) -> Result<(), Failure> {
         let ended = self.end(outcome)?;
         if self.json {
@@ -516,7 +529,7 @@ impl Session {
         ended.failure.map_or(ended.plotted, Err)
     }
 
-    /// Closes the recording, writes plots and summary.
+    /// Closes the recording, and writes plots and summary.
     fn end(&mut self, outcome: Result<Ending, Failure>) -> Result<Ended, Failure> {
         let mut served = None;
         let mut recorded = None;
@@ -534,7 +547,7 @@ impl Session {
                     recorded = done.saved.first().map(|s| (s.path.clone(), s.bytes));
                     served = done.served;
                 }
-                // The cause of an early end, or a fault at the very end.
+                // This is the cause of an early end, or an error while closing.
                 Err(e) => fault = Some(Failure::from(e)),
             }
         }
@@ -574,20 +587,20 @@ impl Session {
         Ok(Ended { summary, json, recorded, served, failure, plotted })
     }
 
-    /// Plots the table. Rows are not kept meanwhile: a run of millions of steps takes no more memory
-    /// than a short one.
+    /// Plots the table. Rows are read from the file, not kept in memory, so that memory does not
+    /// grow with the number of steps.
     fn plot(&self) -> Result<(), Failure> {
         let rows = series::rows(&self.folder.join("series.csv"), &self.plan)
             .map_err(|e| Failure::Environment(e.to_string()))?;
         Ok(plots_of_run(&self.folder, &self.plan, &rows)?)
     }
 
-    /// What a person wants to know at the end.
+    /// The text printed at the end of a run.
     fn report(&self, s: &Summary, recorded: Option<(PathBuf, u64)>) -> String {
         let ending = match s.ending {
             Ending::Finished => "finished",
             Ending::StepLimit => "stopped at the step limit",
-            Ending::BudgetSpent => "stopped because the budget is spent",
+            Ending::BudgetSpent => "stopped at the time budget",
             Ending::Interrupted => "interrupted",
             Ending::Failed => "failed",
         };
@@ -623,7 +636,7 @@ impl Session {
         out += &format!("  folder: {}\n", self.folder.display());
         if let (Some(step), true) = (self.kept, s.ending != Ending::Finished) {
             let folder = self.folder.display();
-            out += &format!("  state of step {step} kept: grainscope resume {folder} goes on\n");
+            out += &format!("  state of step {step} saved: grainscope resume {folder} continues\n");
         }
         if let Some((path, bytes)) = recorded {
             out += &format!("  recording: {} ({:.1} MB)\n", path.display(), bytes as f64 / 1e6);
@@ -632,16 +645,17 @@ impl Session {
     }
 }
 
+/// The failure to write a file.
 fn cannot(path: &Path, e: std::io::Error) -> Failure {
     Failure::Environment(format!("cannot write {}: {e}", path.display()))
 }
 
+/// The failure of a recording that ended before the run.
 fn ended_early() -> Failure {
     Failure::Environment("the recording ended early".into())
 }
 
-/// Starts the logger of a run that stands at its first instant, or goes on after a later one; the
-/// warnings that there are then.
+/// Starts the logger of a new or resumed run. Returns it with all warnings so far.
 fn start_logger(
     args: &Args,
     plan: &Plan,
@@ -687,7 +701,7 @@ fn start_logger(
     let mut logger = Logger::start(log, policy)
         .map_err(|e| Failure::Environment(format!("the logger thread cannot be started: {e}")))?;
     if step > 0 && last_step != Some(step) {
-        // It ended before this step was recorded.
+        // The recording ended before this step.
         let wall = run.row().wall;
         let frame = info::frame(plan, run.row(), wall, Some(run.picture()), vec![]);
         logger.send(frame).map_err(|_| ended_early())?;
@@ -695,10 +709,10 @@ fn start_logger(
     Ok((Some(logger), warnings))
 }
 
-/// What a checkpoint says of a run besides its state.
+/// The data of a checkpoint besides the state of the simulation.
 struct Past {
     tally: Tally,
-    /// Seconds, frames, seconds of the logger.
+    /// Wall time (s), frames, and time of the logger (s).
     before: (f64, Traffic, f64),
     recording: Option<PathBuf>,
     warnings: Vec<String>,
@@ -727,7 +741,7 @@ impl Past {
         state.put_counts("session.frames", [traffic.frames, traffic.drops, traffic.waits]);
         self.safety.save(state);
         if let Some(recording) = &self.recording {
-            // The folder of a run may be moved; what lies elsewhere may not.
+            // The folder of a run may be moved, so paths inside it are saved as relative paths.
             let inside = recording.strip_prefix(folder).map(Path::to_path_buf);
             let path = inside.or_else(|_| std::path::absolute(recording));
             let path = path.unwrap_or_else(|_| recording.clone());
@@ -767,7 +781,7 @@ impl Past {
     }
 }
 
-/// A failure in one line, for the summary.
+/// The message of a failure in one line, for the summary.
 pub(super) fn describe(f: &Failure) -> Option<String> {
     match f {
         Failure::Sim(e) => Some(format!("{e}; {}", SimError::remedy(e))),

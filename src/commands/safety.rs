@@ -1,29 +1,32 @@
-//! Options of runs that keep what was computed, and tell what goes wrong.
+//! This module defines the options of a run for checkpoints and for steps that fail.
 
 use crate::sim::guard::Policy;
 use crate::sim::state::{State, StateError};
 
+/// Options for checkpoints and for steps that fail.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct Safety {
-    /// Keep the state every so many steps, for `grainscope resume`; the last two stay
+    /// Write a checkpoint every STEPS steps, for `grainscope resume`; the last two are kept
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
     pub checkpoint_every: Option<u64>,
-    /// What to do about a step that fails [default: cut-dt]
+    /// What to do when a step fails [default: cut-dt]
     #[arg(long, value_name = "POLICY", value_enum)]
     pub on_fault: Option<OnFault>,
 }
 
+/// What to do when a step fails.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OnFault {
     /// End the run at its last good state
     Stop,
-    /// Take the step again, shorter, a few times; then end the run
+    /// Repeat the step a few times with a shorter time step; then end the run
     CutDt,
-    /// As cut-dt, but go on with a note where a state is inaccurate rather than impossible
+    /// As cut-dt, but continue with a note if the state is inaccurate rather than impossible
     Continue,
 }
 
 impl Safety {
+    /// The policy for steps that fail.
     pub fn policy(&self) -> Policy {
         match self.on_fault {
             None | Some(OnFault::CutDt) => Policy::CutStep,
@@ -32,7 +35,7 @@ impl Safety {
         }
     }
 
-    /// What is not given is as it was.
+    /// These options, with those that are not given taken from `before`.
     pub fn or(self, before: Safety) -> Safety {
         Safety {
             checkpoint_every: self.checkpoint_every.or(before.checkpoint_every),
@@ -40,6 +43,7 @@ impl Safety {
         }
     }
 
+    /// Saves the options in a checkpoint's state.
     pub fn save(&self, state: &mut State) {
         let policy = match self.on_fault {
             None => 0,
@@ -50,6 +54,7 @@ impl Safety {
         state.put_counts("session.safety", [self.checkpoint_every.unwrap_or(0), policy]);
     }
 
+    /// Loads the options from a checkpoint's state.
     pub fn load(state: &State) -> Result<Safety, StateError> {
         let [every, policy] = state.tally("session.safety")?;
         let on_fault = match policy {

@@ -1,24 +1,25 @@
-//! `grainscope stress`: hard cases, each with a verdict.
+//! This module implements `grainscope stress`: hostile scenes, with a verdict for each.
 
 use super::{Failure, print};
 use crate::stress::{self, Outcome, Trial};
 use std::path::PathBuf;
 
-/// Run hostile scenes and say how each stays inside fixed criteria.
+/// Run hostile scenes and check each against fixed criteria.
 ///
-/// Prints one table as Markdown. Exit code 6 if a trial fails; its scene and the reason are kept.
+/// Prints one table as Markdown. If a trial fails, the exit code is 6, and its scene and the reason
+/// are saved.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Only trials whose group or name contains one of these (any case)
+    /// Run only trials whose group or name contains one of these texts (in upper or lower case)
     #[arg(value_name = "NAME-FILTER")]
     filters: Vec<String>,
-    /// The short trials only: under a minute
+    /// Run the short trials only, in less than a minute
     #[arg(long)]
     quick: bool,
     /// Print criteria and outcomes as JSON
     #[arg(long)]
     json: bool,
-    /// Write FOLDER/stress.md; only for the whole battery
+    /// Write FOLDER/stress.md; only when all trials are run
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["quick", "filters"])]
     write: Option<PathBuf>,
     /// Folder for the scenes of failing trials
@@ -26,6 +27,7 @@ pub struct Args {
     keep: PathBuf,
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let filters: Vec<String> = args.filters.iter().map(|f| f.to_lowercase()).collect();
     let wanted = |t: &Trial| {
@@ -35,7 +37,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let trials: Vec<Trial> = stress::all()?.into_iter().filter(wanted).collect();
     if trials.is_empty() {
-        return Err(Failure::Usage(format!("no trial is called {:?}", args.filters.join(", "))));
+        return Err(Failure::Usage(format!("no trial matches {:?}", args.filters.join(", "))));
     }
     let outcomes = stress::run_all(&trials, |done, o| {
         eprintln!("{done}/{} {}: {}: {}", trials.len(), o.group, o.name, o.verdict);
@@ -54,7 +56,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     conclude(args, &trials, &outcomes)
 }
 
-/// Keeps what failed.
+/// Saves failed trials and reports them.
 fn conclude(args: &Args, trials: &[Trial], outcomes: &[Outcome]) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for (trial, o) in trials.iter().zip(outcomes).filter(|(_, o)| o.verdict.is_failure()) {

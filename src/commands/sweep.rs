@@ -1,4 +1,5 @@
-//! `grainscope sweep`: many runs of one scene, on this machine or through HyperQueue.
+//! This module implements `grainscope sweep`: many runs of one scene, on this machine or through
+//! HyperQueue.
 
 use super::{Failure, compare as comparison, print, run};
 use crate::compare;
@@ -16,33 +17,33 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Most runs that stand side by side unless they are named.
+/// Largest number of runs shown side by side unless they are named.
 const MOST_SIDE_BY_SIDE: usize = 8;
 
-/// Steps of the progress bar.
+/// Number of units of the progress bar.
 const PARTS: f64 = 10_000.0;
 
 const EXAMPLES: &str = "\
 Examples:
-  grainscope sweep fig3                                 the source's Fig. 3, with one command
+  grainscope sweep fig3                                 the runs of Fig. 3 of the source paper
   grainscope sweep silo --vary alpha=0,1/3,5/3 --vary contrast=log:10..1e4:4 --repeat-seeds 3
   grainscope sweep silo --vary alpha=0..3 --vary aperture=0.5..2 --sample sobol:32
-  grainscope sweep silo --vary alpha=0..3:7 --engine hq on a cluster: HyperQueue's workers run it
+  grainscope sweep silo --vary alpha=0..3:7 --engine hq on a cluster, by workers of HyperQueue
   grainscope sweep collect sweeps/silo                  table, plots
   grainscope sweep list sweeps/silo --missing | parallel grainscope sweep case sweeps/silo";
 
 /// Run a scene for many values of its parameters.
 ///
-/// Cases that are done are not run again: the same command goes on where the last one ended, and
-/// tries again what failed. SCENE is a preset's name, a scene file, a sweep of the program
-/// (`grainscope sweep presets`) or a sweep file.
+/// Finished cases are not run again: repeating the command runs the missing and failed cases.
+/// SCENE is the name of a preset, a scene file, a built-in sweep (`grainscope sweep presets`) or a
+/// sweep file.
 #[derive(clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// What is run: a scene or a sweep
+    /// Scene or sweep to run
     #[arg(required = true)]
     scene: Option<String>,
     /// Values of a parameter or key: alpha=0,1/3,5/3 or alpha=0..1:5 or contrast=log:1e1..1e6:6
@@ -51,31 +52,31 @@ pub struct Args {
     /// Set a parameter (contrast=100) or any key (accuracy.cells=16) in all cases
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-    /// Fill ranges without a count (alpha=0..1) with this many points of a Sobol sequence
+    /// Sample all ranges without a count (alpha=0..1) with N points of a Sobol sequence
     #[arg(long, value_name = "sobol:N")]
     sample: Option<String>,
-    /// Run every case with this many seeds of its particles and random directors
+    /// Run every case with K seeds of its particles and random directors
     #[arg(long, value_name = "K")]
     repeat_seeds: Option<u32>,
     /// Folder of the sweep [default: sweeps/<name>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Where cases run
+    /// Engine that runs the cases
     #[arg(long, value_enum, default_value_t = EngineName::Local)]
     engine: EngineName,
-    /// Most cases at once [default: as many as cores and memory hold]
+    /// Largest number of cases at once [default: as many as cores and memory allow]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     jobs: Option<u32>,
-    /// Cores of each case
+    /// Number of cores of each case
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
     cores: u32,
-    /// Coarse and short, for sweeps that say how: to see whether it works
+    /// Use the coarse and short settings of the sweep, as a test
     #[arg(long)]
     quick: bool,
     /// Write no recordings
     #[arg(long)]
     no_recordings: bool,
-    /// Write cases.json, say what would run, and end
+    /// Write cases.json and print what would run, without running it
     #[arg(long)]
     dry_run: bool,
 }
@@ -84,25 +85,25 @@ pub struct Args {
 enum EngineName {
     /// Processes on this machine
     Local,
-    /// Tasks of a HyperQueue server, started with `hq` or what HQ_ENTRY names
+    /// Tasks of a HyperQueue server, submitted with `hq` or the command in HQ_ENTRY
     Hq,
 }
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Gather all cases: one table, spread over seeds, plots, a recording side by side
+    /// Collect all cases: one table, spread over seeds, plots, a recording side by side
     Collect {
         /// Folder of the sweep
         folder: PathBuf,
-        /// Put these cases side by side: numbers or ids; without any, those of the first seed
+        /// Record these cases side by side (numbers or ids) [default: those of the first seed]
         #[arg(long, num_args = 0.., value_name = "CASE")]
         side_by_side: Option<Vec<String>>,
     },
-    /// Run one case: for arrays of batch systems
+    /// Run one case, for job arrays of batch systems
     Case {
         /// Folder of the sweep
         folder: PathBuf,
-        /// Number or id
+        /// Number or id of the case
         case: String,
         /// End when the standard input ends
         #[arg(long, hide = true)]
@@ -112,13 +113,13 @@ enum Command {
     List {
         /// Folder of the sweep
         folder: PathBuf,
-        /// Ids of those that are not done, one a line
+        /// Print only the ids of cases that are not done, one per line
         #[arg(long)]
         missing: bool,
     },
-    /// List the sweeps that come with the program, or show one
+    /// List the built-in sweeps, or print one
     Presets {
-        /// Show this one
+        /// Name of the sweep to print
         name: Option<String>,
     },
 }
@@ -133,6 +134,7 @@ impl From<SweepError> for Failure {
     }
 }
 
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     match &args.command {
         None => sweep(args),
@@ -160,13 +162,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// What the command line asks for.
+/// Reads the sweep that the command line specifies.
 fn spec(args: &Args) -> Result<Spec, Failure> {
     let name = args.scene.clone().unwrap_or_default();
     let known = read_file(&name)?;
     if args.quick && known.is_none() {
         return Err(Failure::Usage(format!(
-            "--quick: {name} is a scene and says not what is quick; --set accuracy.cells=2, say"
+            "--quick: the scene {name} has no quick settings; use --set accuracy.cells=2, say"
         )));
     }
     let mut spec = known.unwrap_or_else(|| Spec {
@@ -180,7 +182,7 @@ fn spec(args: &Args) -> Result<Spec, Failure> {
         spec = spec.quick();
     }
     let named = |v: &String| v.split('=').next().unwrap_or_default().trim().to_owned();
-    // What is varied on the command line replaces what the sweep varies.
+    // A `--vary` of the command line replaces that of the sweep for the same name.
     let anew: Vec<String> = args.vary.iter().map(named).collect();
     spec.vary.retain(|v| !anew.contains(&named(v)));
     spec.vary.extend(args.vary.clone());
@@ -208,7 +210,7 @@ fn sweep(args: &Args) -> Result<(), Failure> {
     eprintln!("{all} cases, {done} done before, in {}", out.display());
     let strangers = store.strangers(&list);
     if strangers > 0 {
-        eprintln!("note: {strangers} finished runs in it are of other lists and left alone");
+        eprintln!("note: {strangers} finished runs in the folder belong to other lists: not used");
     }
     if args.dry_run {
         return print(&plan_text(&open, args));
@@ -224,26 +226,27 @@ fn sweep(args: &Args) -> Result<(), Failure> {
     }
     eprintln!("in {}", duration(clock.elapsed().as_secs_f64()));
     if interrupted.load(Ordering::SeqCst) {
-        eprintln!("interrupted; what is finished is kept, and the same command goes on");
+        eprintln!("interrupted; finished cases are kept, and the same command continues");
         return Err(Failure::Interrupted);
     }
     verdict(&store, &list)
 }
 
-/// A name that is no scene may be a sweep's, mistyped.
+/// Suggests a sweep if an unknown scene name is similar to the name of a sweep.
 fn propose(failure: Failure, name: &str) -> Failure {
     match (similar(name), failure) {
         (Some(sweep), Failure::Scene(e)) if e.span().is_none() => Failure::Usage(format!(
             "there is no scene and no sweep `{name}`\n  help: did you mean the sweep `{sweep}`? \
-             `grainscope sweep presets` and `grainscope presets` list what there is"
+             `grainscope sweep presets` and `grainscope presets` list all names"
         )),
         (_, failure) => failure,
     }
 }
 
+/// Makes the engine that the command line names.
 fn engine(args: &Args) -> Result<Box<dyn Engine>, Failure> {
     let program = std::env::current_exe().map_err(|e| {
-        Failure::Environment(format!("this program cannot find itself to start cases: {e}"))
+        Failure::Environment(format!("cannot find the path of this program to start cases: {e}"))
     })?;
     let threads = args.cores as usize;
     Ok(match args.engine {
@@ -255,7 +258,7 @@ fn engine(args: &Args) -> Result<Box<dyn Engine>, Failure> {
     })
 }
 
-/// Runs cases under one bar, and says what becomes of each.
+/// Runs cases with one progress bar, and prints the result of each.
 fn drive(
     engine: &dyn Engine,
     store: &Store,
@@ -296,7 +299,7 @@ fn drive(
     Ok(outcome?)
 }
 
-/// What failed or is missing makes the sweep fail.
+/// Returns a failure if a case failed or is missing.
 fn verdict(store: &Store, list: &List) -> Result<(), Failure> {
     let mut lines = vec![];
     for case in &list.cases {
@@ -312,8 +315,8 @@ fn verdict(store: &Store, list: &List) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Differs(format!(
-        "{} of {} cases are not done; the same command tries them again\n{}\n  help: what failed \
-         runs left is in {}",
+        "{} of {} cases are not done; the same command runs them again\n{}\n  help: the files of \
+         failed runs are in {}",
         lines.len(),
         list.cases.len(),
         lines.join("\n"),
@@ -321,7 +324,7 @@ fn verdict(store: &Store, list: &List) -> Result<(), Failure> {
     )))
 }
 
-/// One case, in this process.
+/// Runs one case in this process.
 fn one(store: &Store, name: &str, stop_with_input: bool) -> Result<(), Failure> {
     let (list, source) = store.read()?;
     let case = list.case(name)?;
@@ -348,6 +351,7 @@ fn one(store: &Store, name: &str, stop_with_input: bool) -> Result<(), Failure> 
     }
 }
 
+/// Runs a case into a folder.
 fn solve(
     case: &Case,
     source: &SceneSource,
@@ -360,11 +364,11 @@ fn solve(
     Ok(())
 }
 
-/// Takes the end of the standard input for an interrupt: so no case outlives the sweep it is of.
+/// Treats the end of the standard input as an interrupt, so that no case outlives its sweep.
 fn watch_input(interrupted: &Arc<AtomicBool>) -> Result<(), Failure> {
     let flag = interrupted.clone();
     let watch = move || {
-        // Nothing is written there; it returns at the end, or when it cannot be read.
+        // No data arrive; the copy returns at the end of the input or on a read error.
         let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
         flag.store(true, Ordering::SeqCst);
     };
@@ -374,6 +378,7 @@ fn watch_input(interrupted: &Arc<AtomicBool>) -> Result<(), Failure> {
     }
 }
 
+/// Prints the cases, or the ids of those that are not done.
 fn show_list(store: &Store, missing: bool) -> Result<(), Failure> {
     let (list, _) = store.read()?;
     let line = |case: &Case| {
@@ -392,7 +397,7 @@ fn show_list(store: &Store, missing: bool) -> Result<(), Failure> {
     if lines.is_empty() { Ok(()) } else { print(&lines.join("\n")) }
 }
 
-/// What would run, and what it needs.
+/// Lists the cases that would run, with their unknowns and memory.
 fn plan_text(open: &[&Case], args: &Args) -> String {
     let mut lines: Vec<String> = open
         .iter()
@@ -421,8 +426,8 @@ fn plan_text(open: &[&Case], args: &Args) -> String {
     lines.join("\n")
 }
 
-/// Tables, plots and, if asked for, a recording side by side: of the cases named, or of all of the
-/// first seed.
+/// Writes tables, plots and, on request, a recording side by side of the named cases, or of those
+/// of the first seed.
 fn collect(store: &Store, list: &List, side_by_side: Option<&[String]>) -> Result<(), Failure> {
     let found = Collection::new(store, list)?;
     let mut files = found.write_tables(store.root())?;
@@ -446,17 +451,19 @@ fn collect(store: &Store, list: &List, side_by_side: Option<&[String]>) -> Resul
     print(&text)
 }
 
+/// Finds cases by number or id.
 fn chosen<'a>(list: &'a List, named: &[String]) -> Result<Vec<&'a Case>, Failure> {
     Ok(named.iter().map(|name| list.case(name)).collect::<Result<_, _>>()?)
 }
 
+/// Finished cases of the first seed, at most [`MOST_SIDE_BY_SIDE`].
 fn of_first_seed<'a>(store: &Store, list: &'a List) -> Vec<&'a Case> {
     let first = list.cases.first().and_then(|c| c.seed);
     let done = list.cases.iter().filter(|c| c.seed == first && store.state(&c.id) == State::Done);
     done.take(MOST_SIDE_BY_SIDE).collect()
 }
 
-/// One recording and plots of some cases, compared with the first of them.
+/// Writes one recording and plots of some cases, compared with the first of them.
 fn beside(store: &Store, cases: &[&Case]) -> Result<PathBuf, Failure> {
     let folders: Vec<PathBuf> = cases.iter().map(|c| store.done(&c.id)).collect();
     let mut members = compare::open_all(&folders)?;

@@ -1,22 +1,14 @@
-//! How far curves of two runs are from each other.
+//! This module computes the distances between the curves of two runs.
 
 use super::{CurveChange, Member};
 
-/// Curves that are compared: errors and counts are not, whatever they are called.
-fn compared(key: &str) -> bool {
-    let name = key.rsplit('.').next().unwrap_or(key);
-    let left_out =
-        ["step", "time", "dt", "iterations", "particles", "stabilisation", super::table::SECONDS];
-    !left_out.contains(&name) && !name.ends_with("_error") && !name.ends_with("_drift")
-}
-
-/// The largest distance of each curve from the first run's, up to a time.
+/// The largest distance of each curve from that of the first run, up to the time `until` (s).
 pub fn changes(members: &[Member], until: f64) -> Vec<CurveChange> {
     let Some((first, others)) = members.split_first() else { return vec![] };
     let Some(a) = &first.table else { return vec![] };
     let mut list = vec![];
     for (member, b) in others.iter().filter_map(|m| Some((m, m.table.as_ref()?))) {
-        for (key, column) in a.columns.iter().filter(|(key, _)| compared(key)) {
+        for (key, column) in a.columns.iter().filter(|(key, _)| super::table::has_curve(key)) {
             let Some(other) = b.columns.get(key) else { continue };
             let shared = || a.times().iter().zip(column).filter(|(t, _)| !super::later(**t, until));
             let scale = shared().map(|(_, v)| v.abs()).fold(0.0, f64::max);

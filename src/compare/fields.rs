@@ -1,42 +1,48 @@
-//! Differences of fields. Particles of two runs have no one-to-one match; fields on a common grid
-//! do.
+//! This module computes differences of fields. Particles of two runs have no one-to-one
+//! correspondence, but fields can be compared on a common grid.
 
 use super::{Member, later};
 use crate::frame::{GridField, Quantity, Rect};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Share of the differences that the colour scale covers: tips at corners would drown the rest.
+/// Fraction of the differences inside the range of the colour scale. Peaks at corners would
+/// otherwise determine the range.
 const COVERED: f64 = 0.995;
 
-/// How far a field is from the first run's.
+/// Distance of a field from that of the first run.
 #[derive(Clone, Debug, Serialize)]
 pub struct FieldChange {
+    /// Name of the field.
     pub field: String,
+    /// Name of the run.
     pub run: String,
-    /// Largest over time: root mean square of the difference over that of the first run's field.
+    /// Largest relative difference over time: root mean square of the difference over that of the
+    /// first run's field.
     pub largest: f64,
-    /// Where (s).
+    /// Time of the largest difference (s).
     pub at: f64,
-    /// At the last time both have.
+    /// Relative difference at the last common time.
     pub last: f64,
 }
 
-/// Fields of one run less those of the first.
+/// Fields of one run minus those of the first run.
 pub struct Pair {
-    /// The first run and the other one.
+    /// Indices of the first run and of the other run.
     pub runs: [usize; 2],
-    /// What both show.
+    /// Common part of both domains (m).
     pub domain: Rect,
+    /// Quantities of the fields.
     pub quantities: Vec<Quantity>,
-    /// By time (s).
+    /// Time (s) and differences at that time.
     pub frames: Vec<(f64, Vec<GridField>)>,
+    /// Distance of each field from that of the first run.
     pub changes: Vec<FieldChange>,
 }
 
 type Pictures = Vec<(f64, GridField)>;
 
-/// Differences of each run to the first, at the times of the first one's pictures.
+/// Differences of each run from the first one, at the picture times of the first run up to `until`.
 pub fn differences(members: &[Member], until: f64, notes: &mut Vec<String>) -> Vec<Pair> {
     let fields: Vec<Option<BTreeMap<String, Pictures>>> = members
         .iter()
@@ -48,7 +54,7 @@ pub fn differences(members: &[Member], until: f64, notes: &mut Vec<String>) -> V
         let (Some(info_a), Some(info_b)) = (&members[0].info, &members[k].info) else { continue };
         let names = || format!("{} and {}", members[0].name, members[k].name);
         let Some(domain) = info_a.domain.common(info_b.domain) else {
-            notes.push(format!("the domains of {} do not meet: no fields to compare", names()));
+            notes.push(format!("the domains of {} do not overlap: no fields to compare", names()));
             continue;
         };
         let quantities: Vec<Quantity> = (info_a.fields.iter())
@@ -57,7 +63,7 @@ pub fn differences(members: &[Member], until: f64, notes: &mut Vec<String>) -> V
             .collect();
         if quantities.is_empty() {
             notes.push(format!(
-                "{} have no field in common whose numbers were recorded: no difference is shown",
+                "{} have no recorded field in common: no difference is shown",
                 names()
             ));
             continue;
@@ -119,7 +125,7 @@ fn pair(
     Pair { runs: [0, k], domain, quantities, frames, changes }
 }
 
-/// A field on the grid that is compared on; one that is there already is not interpolated.
+/// The field on the common grid. It is not interpolated if it is on that grid already.
 fn on_grid(field: &GridField, domain: Rect, [nx, ny]: [usize; 2]) -> GridField {
     let rect = field.rect();
     let near = |a: f32, b: f32, cell: f32| (a - b).abs() < 1e-3 * cell;
@@ -131,7 +137,7 @@ fn on_grid(field: &GridField, domain: Rect, [nx, ny]: [usize; 2]) -> GridField {
     if same { field.clone() } else { field.on(domain, nx, ny) }
 }
 
-/// A field at a time, between the pictures before and after; `None` outside.
+/// The field at a time, interpolated between snapshots; `None` outside their time range.
 fn at_time(pictures: &[(f64, GridField)], time: f64) -> Option<GridField> {
     let room = super::SAME_TIME * time.abs();
     let after = pictures.partition_point(|(t, _)| *t < time - room);
@@ -153,7 +159,7 @@ fn rms(values: &[f32]) -> f64 {
     (finite().map(|v| v * v).sum::<f64>() / finite().count().max(1) as f64).sqrt()
 }
 
-/// The end of a colour scale for all times.
+/// End of the colour scale for all times.
 fn reach(pictures: &[(f64, GridField)]) -> f32 {
     let mut sizes: Vec<f32> = pictures
         .iter()
@@ -164,12 +170,12 @@ fn reach(pictures: &[(f64, GridField)]) -> f32 {
     sizes.sort_by(f32::total_cmp);
     let place = (COVERED * sizes.len() as f64) as usize;
     let covered = sizes.get(place.min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0);
-    // Differences in a corner only are still seen.
+    // If differences are confined to a corner, the largest one is the end.
     let reach = if covered > 0.0 { covered } else { sizes.last().copied().unwrap_or(0.0) };
     if reach > 0.0 { reach } else { 1.0 }
 }
 
-/// A difference in words, for titles.
+/// Title of a difference: `<other run> − <first run>`.
 pub fn title(members: &[Member], runs: [usize; 2]) -> String {
     let [a, b] = runs.map(|k| &members[k].name);
     format!("{b} − {a}")

@@ -1,4 +1,4 @@
-//! One run of a comparison, read from what is there of it: a folder, a recording, a summary.
+//! This module reads one run of a comparison from a folder, a recording or a summary.
 
 use super::table::{SECONDS, Table};
 use super::{RunHead, later};
@@ -11,38 +11,50 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Why runs cannot be compared.
+/// Error of comparing runs.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
+    /// The path does not exist.
     #[error("{}: there is no such file or folder; give a run's folder, a recording (.rrd) or a summary.json", .0.display())]
     Missing(PathBuf),
+    /// The folder contains no run.
     #[error("{}: holds no run; expected {} in it", .0.display(), FILES[..4].join(", "))]
     NoRun(PathBuf),
+    /// The file is neither a recording nor a summary.
     #[error("{}: is neither a recording (.rrd) nor a summary (.json)", .0.display())]
     Unknown(PathBuf),
+    /// The content of a file is not valid.
     #[error("{}: {cause}", path.display())]
-    Broken { path: PathBuf, cause: String },
+    Broken {
+        /// Path of the file.
+        path: PathBuf,
+        /// Description of the error.
+        cause: String,
+    },
+    /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] ReadError),
+    /// The scene of the run is not valid.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The arguments are not valid.
     #[error("{0}")]
     Usage(String),
 }
 
-/// What a run is known from.
+/// Kind of data from which a run was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// A folder with a series.
+    /// A folder with `series.csv`.
     Folder,
-    /// A recording alone.
+    /// A recording without a folder.
     Recording,
-    /// A summary alone: numbers of the end.
+    /// A summary alone, which has values at the end only.
     Summary,
 }
 
-/// What is read of `summary.json`.
+/// The parts of `summary.json` that are read.
 #[derive(Clone, Debug, Deserialize)]
 struct Summary {
     schema: u32,
@@ -54,7 +66,7 @@ struct Summary {
     error: Option<String>,
     steps: u64,
     time: f64,
-    // Numbers that are not finite are null in JSON.
+    // JSON has null for numbers that are not finite.
     max_speed: Option<f64>,
     rms_speed: Option<f64>,
     particles: u64,
@@ -74,23 +86,29 @@ struct Gauge {
 
 /// A run that was read.
 pub struct Member {
+    /// Name of the run in the comparison.
     pub name: String,
+    /// Path of its folder or file.
     pub path: PathBuf,
+    /// Kind of data from which it was read.
     pub kind: Kind,
-    /// Where it ends (s).
+    /// Simulated time at the end (s).
     pub end: f64,
+    /// The series; `None` for a summary alone.
     pub table: Option<Table>,
-    /// The resolved scene.
+    /// The resolved scene, as TOML; `None` if unknown.
     pub scene_toml: Option<String>,
+    /// Constant part of a recording of the scene; `None` if the scene is unknown.
     pub info: Option<RunInfo>,
+    /// The recording; `None` if there is none.
     pub recorded: Option<Recorded>,
-    /// What is odd about it.
+    /// Messages about missing or incomplete data.
     pub notes: Vec<String>,
     summary: Option<Summary>,
     scene: Option<(String, String)>,
 }
 
-/// Reads runs and gives them names that differ.
+/// Reads runs and gives them different names.
 pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, CompareError> {
     if paths.len() < 2 {
         return Err(CompareError::Usage(
@@ -124,7 +142,7 @@ pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, CompareError> {
 }
 
 impl Member {
-    /// Reads a run from its folder, one of its files, a recording or a summary.
+    /// Reads a run from its folder, from a file in its folder, or from a recording or summary.
     pub fn open(path: &Path) -> Result<Member, CompareError> {
         if path.is_dir() {
             return Self::folder(path);
@@ -175,8 +193,8 @@ impl Member {
         if let Some(recording) = recording {
             match Recorded::open(&recording) {
                 Ok(recorded) => member.take(recorded),
-                // The numbers are elsewhere: pictures are what is missed.
-                Err(e) => member.notes.push(format!("{e}; it is compared without pictures")),
+                // The values come from the series; only the pictures are missing.
+                Err(e) => member.notes.push(format!("{e}; the run is compared without pictures")),
             }
         }
         member.resolve()?;
@@ -245,7 +263,7 @@ impl Member {
                 s.error.as_ref().map_or(String::new(), |e| format!(": {e}"))
             )),
             None => self.notes.push(format!(
-                "{} has no summary.json: it was ended from outside, or still runs",
+                "{} has no summary.json: it was killed or is still running",
                 self.name
             )),
             _ => {}
@@ -255,14 +273,14 @@ impl Member {
     fn take(&mut self, recorded: Recorded) {
         if let Some(cause) = &recorded.cut {
             self.notes.push(format!(
-                "the recording of {} is cut ({cause}); what precedes is compared",
+                "the recording of {} is cut ({cause}); the part before the cut is compared",
                 self.name
             ));
         }
         self.recorded = Some(recorded);
     }
 
-    /// What the scene says of domain, walls and plots.
+    /// Resolves the scene: domain, walls and plots.
     fn resolve(&mut self) -> Result<(), CompareError> {
         let Some(text) = &self.scene_toml else { return Ok(()) };
         let source = SceneSource::new(format!("scene of {}", self.path.display()), text.as_str());
@@ -273,7 +291,7 @@ impl Member {
         Ok(())
     }
 
-    /// Gives the run another name.
+    /// Renames the run.
     pub fn rename(&mut self, name: &str) {
         self.name = name.to_owned();
         if let Some(info) = &mut self.info {
@@ -281,10 +299,12 @@ impl Member {
         }
     }
 
+    /// SHA-256 of the final state, hexadecimal; `None` if unknown.
     pub fn state_hash(&self) -> Option<&str> {
         self.summary.as_ref().map(|s| s.state_hash.as_str())
     }
 
+    /// Identity of the run; `first` is the reference run.
     pub(super) fn head(&self, first: &Member) -> RunHead {
         let known = self.summary.as_ref().map(|s| (s.scene.clone(), s.scene_hash.clone()));
         let (scene, scene_hash) = known.or(self.scene.clone()).unzip();
@@ -300,7 +320,7 @@ impl Member {
         }
     }
 
-    /// Numbers at a time; `None` if they are not known there.
+    /// Values at a time; `None` if they are unknown there.
     pub(super) fn values_at(&self, time: f64) -> Option<IndexMap<String, f64>> {
         let mut values = IndexMap::from([("end".to_string(), self.end)]);
         match &self.table {
@@ -311,7 +331,7 @@ impl Member {
                         values.insert(name.clone(), value);
                     }
                 }
-                // The last, for a reader: it depends on the machine.
+                // The computing time comes last: it depends on the machine.
                 if let Some(seconds) = values.shift_remove(SECONDS) {
                     values.insert(SECONDS.into(), seconds);
                 }
@@ -328,12 +348,12 @@ impl Summary {
         let broken = |cause: String| CompareError::Broken { path: path.to_owned(), cause };
         let summary: Summary = serde_json::from_str(&read(path)?).map_err(|e| {
             broken(format!(
-                "is no summary of a run: {e}; expected a summary.json as `run` writes it"
+                "is not the summary of a run: {e}; expected a summary.json of `grainscope run`"
             ))
         })?;
         if summary.schema != crate::record::summary::SCHEMA {
             return Err(broken(format!(
-                "has schema {}; this program reads {}: make it anew with `grainscope run`",
+                "has schema {}; this program reads {}: create it again with `grainscope run`",
                 summary.schema,
                 crate::record::summary::SCHEMA
             )));
@@ -341,7 +361,7 @@ impl Summary {
         Ok(summary)
     }
 
-    /// Numbers under the names that the series gives them.
+    /// Values under the column names of the series.
     fn values(&self) -> IndexMap<String, f64> {
         let mut values = IndexMap::new();
         let mut put = |key: &str, value: Option<f64>| {
@@ -371,7 +391,7 @@ fn read(path: &Path) -> Result<String, CompareError> {
     })
 }
 
-/// The folder's own name, also of `.`.
+/// Name of a folder, also for `.`.
 fn folder_name(folder: &Path) -> String {
     let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned());
     name(folder)

@@ -1,7 +1,7 @@
-//! Comparing runs: values at the end, curves, fields, and the scenes they are of.
+//! This module compares runs: values at the end, curves, fields and scenes.
 //!
-//! The first run is what the others are compared with. Runs of other resolutions, materials or
-//! ends compare at the times they have in common.
+//! The first run is the reference. Runs of other resolutions, materials or end times are compared
+//! at the times that all of them have.
 
 mod curves;
 mod fields;
@@ -19,75 +19,95 @@ pub use view::{plots, record};
 
 use serde::Serialize;
 
-/// Version of the comparison's format as JSON.
+/// Version of the JSON format of a comparison.
 pub const SCHEMA: u32 = 1;
 
-/// Times closer than this, relative to them, are the same.
+/// Relative difference below which times are equal.
 const SAME_TIME: f64 = 1e-9;
 
-/// What was found.
+/// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
+    /// Version of the format: [`SCHEMA`].
     pub schema: u32,
+    /// Version of the program.
     pub version: &'static str,
+    /// The compared runs; the first is the reference.
     pub runs: Vec<RunHead>,
-    /// The time that values are compared at (s): the earliest end.
+    /// Time at which values are compared (s): the earliest end of a run.
     pub time: f64,
+    /// Values of all runs at `time`.
     pub values: Vec<Value>,
+    /// Distances of the curves from those of the first run.
     pub curves: Vec<CurveChange>,
+    /// Distances of the fields from those of the first run.
     pub fields: Vec<fields::FieldChange>,
-    /// Keys of the resolved scenes in which runs differ.
+    /// Keys whose values differ between the resolved scenes.
     pub scenes: Vec<scenes::Change>,
+    /// Results of the tolerance checks.
     pub tolerances: Vec<Verdict>,
+    /// Messages for the user.
     pub notes: Vec<String>,
-    /// Files that were written.
+    /// Paths of the files that were written.
     pub files: Vec<String>,
 }
 
-/// Who a run is.
+/// Identity of a compared run.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunHead {
+    /// Name of the run in the comparison.
     pub name: String,
+    /// Path of its folder or file.
     pub path: String,
+    /// Kind of data that is available.
     pub kind: Kind,
+    /// Name of the scene; `None` if unknown.
     pub scene: Option<String>,
+    /// SHA-256 of the resolved scene, hexadecimal; `None` if unknown.
     pub scene_hash: Option<String>,
+    /// SHA-256 of the final state, hexadecimal; `None` if unknown.
     pub state_hash: Option<String>,
-    /// Where it ends (s).
+    /// Simulated time at the end (s).
     pub end: f64,
-    /// To the first run, by the hash of the state; absent if one has none.
+    /// Whether the final state is that of the first run; `None` if a hash is unknown.
     pub identical: Option<bool>,
 }
 
-/// One number of each run.
+/// One quantity of all runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Value {
+    /// Name of the quantity.
     pub key: String,
+    /// Unit; empty for pure numbers.
     pub unit: &'static str,
+    /// Value of each run; `None` where it is unknown.
     pub values: Vec<Option<f64>>,
-    /// Change from the first run over its magnitude; absent where there is nothing to divide by.
+    /// Change from the first run, relative to the magnitude there; `None` where that is zero or
+    /// unknown.
     pub relative: Vec<Option<f64>>,
 }
 
-/// How far a curve is from the first run's.
+/// Distance of a curve from that of the first run.
 #[derive(Clone, Debug, Serialize)]
 pub struct CurveChange {
+    /// Name of the column.
     pub key: String,
+    /// Name of the run.
     pub run: String,
-    /// Largest distance over the largest magnitude of the first run's curve.
+    /// Largest distance over time, relative to the largest magnitude of the first run's curve.
     pub largest: f64,
-    /// Where (s).
+    /// Time of the largest distance (s).
     pub at: f64,
 }
 
-/// Compares all with the first one. Differences of fields come along: a recording shows them.
+/// Compares all runs with the first one. The result includes the field differences for a recording.
 pub fn compare(members: &[Member], tolerances: &[Tolerance]) -> Result<Found, CompareError> {
     let mut notes: Vec<String> = members.iter().flat_map(|m| m.notes.clone()).collect();
     let time = members.iter().map(|m| m.end).fold(f64::INFINITY, f64::min);
     if let Some(longest) = members.iter().find(|m| later(m.end, time)) {
         notes.push(format!(
             "the runs end at different times; they are compared up to the earliest end, {} s ({} \
-             goes on to {} s)",
+             continues to {} s)",
             short(time),
             longest.name,
             short(longest.end)
@@ -112,8 +132,9 @@ pub fn compare(members: &[Member], tolerances: &[Tolerance]) -> Result<Found, Co
     Ok(Found { comparison, differences })
 }
 
-/// A comparison and the fields' differences that a recording shows.
+/// A comparison, and the field differences for a recording.
 pub struct Found {
+    /// Result of the comparison.
     pub comparison: Comparison,
     differences: Vec<fields::Pair>,
 }
@@ -126,14 +147,14 @@ fn short(value: f64) -> String {
     crate::record::number::short(value)
 }
 
-/// Numbers of each run at a time they have in common.
+/// Values of all runs at a common time.
 fn values(members: &[Member], time: f64, notes: &mut Vec<String>) -> Vec<Value> {
     let at_time: Vec<_> = members.iter().map(|m| m.values_at(time)).collect();
     for (member, values) in members.iter().zip(&at_time) {
         if values.is_none() {
             notes.push(format!(
-                "{} has numbers of its end only, {} s, which other runs do not reach: run them \
-                 that far to compare values",
+                "{} has values only at its end, {} s, which other runs do not reach: run them to \
+                 this time to compare values",
                 member.name,
                 short(member.end)
             ));
@@ -158,7 +179,7 @@ fn values(members: &[Member], time: f64, notes: &mut Vec<String>) -> Vec<Value> 
     list.collect()
 }
 
-/// Relative change from `a` to `b`.
+/// Relative change from `a` to `b`; `None` if it is not finite.
 fn change(a: f64, b: f64) -> Option<f64> {
     if a == b {
         return Some(0.0);

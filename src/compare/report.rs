@@ -1,16 +1,17 @@
-//! A comparison in words: for the terminal, and as Markdown for the recording's panels.
+//! This module formats a comparison: for the terminal, and as Markdown for the panels of a
+//! recording.
 
 use super::{Comparison, short};
 use crate::record::number::trim_zeros;
 use crate::record::text::duration;
 
-/// Most rows of changes in scenes that the terminal shows.
+/// Maximum number of rows that the terminal shows of a table.
 const MOST_CHANGES: usize = 40;
 
-/// Longest cell that the terminal shows whole.
+/// Length above which the terminal truncates cells (characters).
 const LONGEST_CELL: usize = 40;
 
-/// Diagnostics of the method rather than of the flow.
+/// Columns that describe the numerical method, not the flow.
 const TECHNICAL: [&str; 9] = [
     "power_in",
     "power_error",
@@ -23,14 +24,14 @@ const TECHNICAL: [&str; 9] = [
     "work",
 ];
 
-/// A table before it is laid out.
+/// A table before layout.
 struct Grid {
     title: String,
     head: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-/// For the terminal.
+/// Formats a comparison for the terminal.
 pub fn terminal(c: &Comparison) -> String {
     let mut out = String::new();
     for run in &c.runs {
@@ -76,7 +77,7 @@ pub fn terminal(c: &Comparison) -> String {
     out
 }
 
-/// Panels for the recording: title and Markdown.
+/// Panels for the recording: title and Markdown of each.
 pub fn markdown(c: &Comparison) -> [(&'static str, String); 2] {
     let escaped = |cell: &String| cell.replace('|', "\\|");
     let table = |grid: &Grid| {
@@ -105,7 +106,7 @@ pub fn markdown(c: &Comparison) -> [(&'static str, String); 2] {
     [("Values", format!("{said}\n{numbers}")), ("Scenes", scenes)]
 }
 
-/// Who is the same as the first run.
+/// Statements about which runs have the same final state or scene as the first.
 fn identities(c: &Comparison) -> Vec<String> {
     let first = &c.runs[0];
     let mut lines = vec![];
@@ -117,8 +118,8 @@ fn identities(c: &Comparison) -> Vec<String> {
                 run.name, first.name
             )),
             Some(false) if same_scene => lines.push(format!(
-                "{} is of the same scene as {}, but ends in another state: another version of the \
-                 program, or another end?",
+                "{} has the same scene as {}, but another final state: was it run with another \
+                version of the program, or to another end time?",
                 run.name, first.name
             )),
             _ => {}
@@ -162,7 +163,7 @@ fn grids(c: &Comparison) -> Vec<Grid> {
     list
 }
 
-/// A row for each curve and field, a column for each run but the first.
+/// A table with a row for each curve and field, and a column for each run but the first.
 fn distances(c: &Comparison) -> Grid {
     let mut found: Vec<(String, &str, f64, f64)> = vec![];
     for change in c.curves.iter().filter(|c| !is_technical(&c.key)) {
@@ -188,7 +189,7 @@ fn distances(c: &Comparison) -> Grid {
     };
     Grid {
         title:
-            "largest difference over time (curves: of the largest value; fields: root mean squares)"
+            "largest difference over time (curves: relative to the largest value; fields: relative RMS)"
                 .into(),
         head: std::iter::once("of").chain(others()).map(String::from).collect(),
         rows: names
@@ -213,7 +214,7 @@ fn value_row(value: &super::Value) -> Vec<String> {
         let Some(v) = v else { return "-".to_owned() };
         let text = if value.key == super::table::SECONDS { duration(*v) } else { number(*v) };
         match relative {
-            // Relative changes of what should be zero say nothing.
+            // Relative changes of quantities that should be zero are meaningless.
             _ if k == 0 || value.key.ends_with("_drift") => text,
             Some(0.0) => format!("{text} (=)"),
             Some(r) => {
@@ -226,7 +227,7 @@ fn value_row(value: &super::Value) -> Vec<String> {
     [value.key.clone(), unit.to_owned()].into_iter().chain(cells).collect()
 }
 
-/// The beginning of what is too long for a cell.
+/// Truncates text that is too long for a cell.
 fn cut(cell: &str) -> String {
     if cell.chars().count() <= LONGEST_CELL {
         return cell.to_owned();
@@ -234,10 +235,10 @@ fn cut(cell: &str) -> String {
     cell.chars().take(LONGEST_CELL - 1).chain(['…']).collect()
 }
 
-/// Five digits; whole numbers whole.
+/// Formats with five significant digits; integers are written in full.
 fn number(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e9 {
-        // Without the sign of a negative zero.
+        // Adding zero removes the sign of a negative zero.
         return (value + 0.0).to_string();
     }
     let exponent = value.abs().log10().floor();

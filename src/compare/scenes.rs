@@ -1,18 +1,20 @@
-//! What differs between resolved scenes.
+//! This module lists the differences between resolved scenes.
 
 use super::Member;
 use indexmap::IndexMap;
 use serde::Serialize;
 
-/// A key that has not the same value in all scenes.
+/// A key whose value differs between scenes.
 #[derive(Clone, Debug, Serialize)]
 pub struct Change {
+    /// Full path of the key, such as `materials.grains.density`.
     pub key: String,
-    /// As TOML; absent where the scene has no such key, or is not known.
+    /// Value in each scene, as TOML; `None` where the scene lacks the key or is unknown.
     pub values: Vec<Option<String>>,
 }
 
-/// Keys in which the known scenes differ, in the order of the first scene that has them.
+/// Keys whose values differ between the known scenes, in the order of the first scene that has
+/// them.
 pub fn changes(members: &[Member]) -> Vec<Change> {
     let flat: Vec<Option<IndexMap<String, String>>> = members
         .iter()
@@ -35,7 +37,7 @@ pub fn changes(members: &[Member]) -> Vec<Change> {
         .collect()
 }
 
-/// The value at a key; that of a parameter which is not set is its default.
+/// The value of a key. A parameter that is not set has its default value.
 fn value(flat: &IndexMap<String, String>, key: &str) -> Option<String> {
     let default = || {
         let parameter = key.strip_prefix("parameters.")?.strip_suffix(".value")?;
@@ -44,7 +46,7 @@ fn value(flat: &IndexMap<String, String>, key: &str) -> Option<String> {
     flat.get(key).or_else(default).cloned()
 }
 
-/// Every value with its whole path.
+/// All values of a table by their full paths.
 fn flatten(table: &toml::Table) -> IndexMap<String, String> {
     fn walk(path: String, value: &toml::Value, out: &mut IndexMap<String, String>) {
         let below =
@@ -81,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_that_is_not_set_has_its_default() {
+    fn an_unset_parameter_has_its_default() {
         let flat = flatten(&"[parameters.alpha]\ndefault = \"1/3\"".parse().expect("TOML"));
         assert_eq!(value(&flat, "parameters.alpha.value").as_deref(), Some("1/3"));
         assert_eq!(value(&flat, "parameters.beta.value"), None);

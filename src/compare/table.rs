@@ -1,23 +1,25 @@
-//! The series of a run: columns against time.
+//! This module reads the series of a run: columns of values against time.
 
 use crate::record::rerun_log::Sample;
+use crate::sim::row::{COLUMNS, Column, PER_GAUGE, PER_MATERIAL, Rank, find};
 use indexmap::IndexMap;
 use std::collections::BTreeMap;
 
-/// Columns of numbers by name, one value a step; `time` is one of them.
+/// Columns of numbers by name, one value per step. One column is `time`.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
+    /// Columns by name; all have the same length.
     pub columns: IndexMap<String, Vec<f64>>,
 }
 
-/// Columns that say nothing of the flow: they are neither compared nor plotted.
-const BOOKKEEPING: [&str; 4] = ["dt_limiter", "splits", "merges", "held"];
+/// A recorded curve that has a sample at every step.
+const CLOCK: &str = "diagnostics/power_in";
 
-/// Seconds computed so far; the series has seconds per step.
+/// Column of the computing time so far (s). The series itself has seconds per step.
 pub const SECONDS: &str = "seconds";
 
 impl Table {
-    /// Reads `series.csv`. A last row that is cut is left out.
+    /// Parses `series.csv`. An incomplete last row is ignored.
     pub fn parse(text: &str) -> Result<Table, String> {
         let mut lines = text.split_inclusive('\n').filter(|l| l.ends_with('\n')).map(str::trim_end);
         let names: Vec<&str> = lines.next().ok_or("it is empty")?.split(',').collect();
@@ -50,52 +52,52 @@ impl Table {
             });
             columns.insert(SECONDS.into(), sums.collect());
         }
-        columns.retain(|name, _| !BOOKKEEPING.contains(&name.as_str()));
+        columns.retain(|name, _| find(name).is_none_or(|c| c.rank != Rank::Never));
         Ok(Table { columns })
     }
 
-    /// The series that a recording holds, its columns named as those of `series.csv`.
+    /// The series in a recording, with the column names of `series.csv`.
     pub fn of_recording(curves: &BTreeMap<String, Vec<Sample>>) -> Option<Table> {
         let gauges = curves.keys().filter(|path| path.ends_with("/volume")).count();
-        let times: Vec<f64> =
-            curves.get("diagnostics/power_in")?.iter().map(|s| s.time_s).collect();
+        let times: Vec<f64> = curves.get(CLOCK)?.iter().map(|s| s.time_s).collect();
         let mut columns: IndexMap<String, Vec<f64>> = IndexMap::new();
         columns.insert("time".into(), times.clone());
         for (path, samples) in curves {
-            // The time step has no value at the first row; seconds by phase say little.
+            // `dt` has no value in the first row, and the seconds by phase are of little interest.
             if let Some(name) = column(path, gauges)
                 && samples.len() == times.len()
             {
                 columns.insert(name, samples.iter().map(|s| s.value).collect());
             }
         }
-        let walls = curves["diagnostics/power_in"].iter().map(|s| s.wall_s).collect();
+        let walls = curves[CLOCK].iter().map(|s| s.wall_s).collect();
         columns.insert(SECONDS.into(), walls);
         (!times.is_empty()).then_some(Table { columns })
     }
 
+    /// Times of the rows (s).
     pub fn times(&self) -> &[f64] {
         self.columns.get("time").map_or(&[], Vec::as_slice)
     }
 
-    /// Where the series ends (s).
+    /// Time of the last row (s).
     pub fn end(&self) -> f64 {
         self.times().last().copied().unwrap_or(0.0)
     }
 
-    /// A column at a time, by interpolation between steps; `None` beyond the end.
+    /// The value of a column at a time, interpolated between steps; `None` beyond the end.
     pub fn at(&self, column: &[f64], time: f64) -> Option<f64> {
         interpolate(self.times(), column, time)
     }
 
-    /// Points of a column.
+    /// Points (time, value) of a column.
     pub fn points(&self, name: &str) -> Option<Vec<(f64, f64)>> {
         let column = self.columns.get(name)?;
         Some(self.times().iter().copied().zip(column.iter().copied()).collect())
     }
 }
 
-/// A column between rows.
+/// Interpolates a column linearly in time.
 fn interpolate(times: &[f64], values: &[f64], time: f64) -> Option<f64> {
     let (last_time, last) = (*times.last()?, *values.last()?);
     if (time - last_time).abs() <= super::SAME_TIME * last_time.abs() {
@@ -107,54 +109,49 @@ fn interpolate(times: &[f64], values: &[f64], time: f64) -> Option<f64> {
     }
     let (t0, t1) = (times[after - 1], times[after]);
     let (v0, v1) = (values[after - 1], *values.get(after)?);
-    // Whole numbers and exact hits stay what they are.
+    // Integers that do not change, and values at exact times, are kept exactly.
     if time == t0 || v0 == v1 { Some(v0) } else { Some(v0 + (v1 - v0) * (time - t0) / (t1 - t0)) }
 }
 
-/// The column of the series that a recorded scalar is.
+/// The name in `series.csv` of a recorded scalar.
 fn column(path: &str, gauges: usize) -> Option<String> {
+    let in_family = |family: &'static [Column], name: &str| family.iter().find(|c| c.path == name);
     let parts: Vec<&str> = path.split('/').collect();
-    Some(match parts.as_slice() {
-        ["gauges", gauge, what] if gauges > 1 => format!("{gauge}.outflow_{what}"),
-        ["gauges", _, what] => format!("outflow_{what}"),
-        ["diagnostics", name] => name.to_string(),
-        ["texture", "alignment"] => "mean_alignment".into(),
-        ["volume_drift", material] => format!("{material}.volume_drift"),
-        _ => return None,
-    })
+    match parts.as_slice() {
+        ["gauges", gauge, what] => {
+            let name = in_family(&PER_GAUGE, what)?.name;
+            Some(if gauges > 1 { format!("{gauge}.{name}") } else { name.into() })
+        }
+        [family, material] if in_family(&PER_MATERIAL, family).is_some() => {
+            Some(format!("{material}.{}", in_family(&PER_MATERIAL, family)?.name))
+        }
+        _ => in_family(COLUMNS, path).map(|c| c.name.into()),
+    }
 }
 
-/// The rank of a column for a reader: what runs are made for comes first.
+/// Rank of the end time among the compared values.
+const END: usize = 9;
+
+/// Rank of a column in listings; the main results come first.
 pub fn importance(key: &str) -> usize {
-    const ORDER: [&str; 12] = [
-        "outflow_volume",
-        "outflow_rate",
-        "mean_alignment",
-        "max_speed",
-        "rms_speed",
-        "dissipation",
-        "dissipated",
-        "potential_energy",
-        "volume_drift",
-        "end",
-        "step",
-        "particles",
-    ];
-    let name = key.rsplit('.').next().unwrap_or(key);
-    let last = if key == SECONDS { ORDER.len() + 1 } else { ORDER.len() };
-    ORDER.iter().position(|o| *o == name).unwrap_or(last)
+    match (key, find(key).map(|c| c.rank)) {
+        ("end", _) => END,
+        (SECONDS, _) => usize::from(u8::MAX),
+        (_, Some(Rank::Compared(rank) | Rank::Value(rank))) => usize::from(rank),
+        _ => usize::from(u8::MAX) - 1,
+    }
 }
 
-/// The unit of a column.
+/// Whether the curves of a column are compared; errors, drifts and counts are not.
+pub fn has_curve(key: &str) -> bool {
+    matches!(find(key).map(|c| c.rank), Some(Rank::Compared(_)))
+}
+
+/// Unit of a column; empty for pure numbers.
 pub fn unit(key: &str) -> &'static str {
-    match key.rsplit('.').next().unwrap_or(key) {
-        "time" | "end" | "dt" | SECONDS => "s",
-        "outflow_volume" => "m²",
-        "outflow_rate" => "m²/s",
-        "max_speed" | "rms_speed" => "m/s",
-        "power_in" | "dissipation" | "stabilisation" => "W/m",
-        "potential_energy" | "work" | "dissipated" => "J/m",
-        _ => "",
+    match key {
+        "end" | SECONDS => "s",
+        _ => find(key).map_or("", |c| c.unit),
     }
 }
 
@@ -175,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_series_is_told() {
+    fn invalid_series_are_rejected() {
         for text in ["", "a,b\n1,2\n", "step,time\n", "step,time\n1\n"] {
             assert!(Table::parse(text).is_err(), "{text:?}");
         }

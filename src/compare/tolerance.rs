@@ -1,23 +1,25 @@
-//! Tolerances: how far a value may be from the first run's.
+//! This module checks tolerances: the largest allowed difference of a value from the first run.
 
 use super::{CompareError, Member, Value, short};
 use crate::scene::closest;
 use serde::Serialize;
 
-/// The most a value may differ.
+/// Largest allowed difference of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Amount {
-    /// Of the first run's magnitude.
+    /// Fraction of the magnitude in the first run.
     Relative(f64),
-    /// In the value's unit.
+    /// Absolute difference in the unit of the value.
     Absolute(f64),
 }
 
-/// A value and the most it may differ.
+/// A quantity and its largest allowed difference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
+    /// Name of the quantity.
     pub key: String,
+    /// Largest allowed difference.
     pub amount: Amount,
 }
 
@@ -29,11 +31,11 @@ impl std::str::FromStr for Tolerance {
         let (key, amount) = text.split_once('=').ok_or(help)?;
         let number = |text: &str| {
             let value: f64 =
-                text.trim().parse().map_err(|_| format!("{text:?} is no number; {help}"))?;
+                text.trim().parse().map_err(|_| format!("{text:?} is not a number; {help}"))?;
             if value >= 0.0 && value.is_finite() {
                 Ok(value)
             } else {
-                Err(format!("{value} is no tolerance: it must not be negative"))
+                Err(format!("{value} is not a tolerance: give a finite number, 0 or more"))
             }
         };
         let amount = match amount.trim().strip_suffix('%') {
@@ -53,22 +55,26 @@ impl std::fmt::Display for Amount {
     }
 }
 
-/// Whether a run keeps a tolerance.
+/// Result of checking one tolerance on one run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
+    /// Name of the quantity.
     pub key: String,
+    /// Name of the run.
     pub run: String,
+    /// Largest allowed difference.
     pub tolerance: Amount,
-    /// Of the first run, and of this one.
+    /// Value in the first run and in this one; `None` if unknown.
     pub values: [Option<f64>; 2],
-    /// Change, as the tolerance measures it; absent if a value is not known.
+    /// Difference, relative or absolute like the tolerance; `None` if a value is unknown.
     pub difference: Option<f64>,
+    /// Whether the difference is within the tolerance.
     pub within: bool,
-    /// The finding in a sentence.
+    /// The result as a sentence.
     pub text: String,
 }
 
-/// Judges every run but the first. Keys that no run has are refused.
+/// Checks every run but the first. Unknown keys are an error.
 pub fn judge(
     tolerances: &[Tolerance],
     members: &[Member],
@@ -136,7 +142,7 @@ fn verdict(
     verdict
 }
 
-/// Six digits: enough to see what a tolerance of a tenth of a per mille saw.
+/// Formats with six significant digits.
 fn digits(value: f64) -> String {
     let text = format!("{value:.5e}");
     text.parse::<f64>().map_or(text.clone(), |v| {

@@ -1,4 +1,4 @@
-//! What one looks at: plots with the runs' curves in one frame, and the recording side by side.
+//! This module draws the curves of all runs in common plots, and records the runs side by side.
 
 use super::{Comparison, Found, Kind, Member, fields, later, report, table};
 use crate::frame::RunInfo;
@@ -6,10 +6,10 @@ use crate::record::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_p
 use crate::record::rerun_log::{Difference, Finished, RecordError, RecordedRun, SideBySide, Sink};
 use std::path::{Path, PathBuf};
 
-/// Columns that share a figure: its name, and title, column and name of the axis of each panel.
+/// Name of a figure; title, column and axis name of each of its panels.
 type Figure = (String, Vec<(String, String, &'static str)>);
 
-/// Writes the plots as `<stem>_<name>.svg` and `.png`; returns what was written.
+/// Writes the plots to `<stem>_<name>.svg` and `.png`; returns the paths of the files.
 pub fn plots(stem: &Path, members: &[Member]) -> Result<Vec<PathBuf>, PlotError> {
     let tables = || members.iter().filter_map(|m| Some((m, m.table.as_ref()?)));
     if tables().count() < 2 {
@@ -65,8 +65,8 @@ fn figures(members: &[Member]) -> Vec<Figure> {
         list.push((
             format!("{}outflow", gauge.replace('.', "_")),
             vec![
-                panel(&format!("volume that has flowed out{of}"), column, "outflow volume"),
-                panel("rate of outflow", &format!("{gauge}outflow_rate"), "outflow rate"),
+                panel(&format!("outflow volume{of}"), column, "outflow volume"),
+                panel("outflow rate", &format!("{gauge}outflow_rate"), "outflow rate"),
             ],
         ));
     }
@@ -93,7 +93,7 @@ fn figures(members: &[Member]) -> Vec<Figure> {
     list
 }
 
-/// Records the runs side by side; `None` if fewer than two have pictures.
+/// Records the runs side by side; `None` if fewer than two runs have recordings.
 pub fn record(
     found: Found,
     members: &[Member],
@@ -105,7 +105,7 @@ pub fn record(
         .filter_map(|m| Some(RecordedRun { info: m.info.clone()?, recorded: m.recorded.as_ref()? }))
         .collect();
     if lanes.len() < 2 {
-        // Whoever compares with a summary alone does not expect pictures.
+        // A comparison with a summary alone is not expected to have pictures.
         if members.iter().all(|m| m.kind != Kind::Summary) {
             comparison.notes.push(
                 "fewer than two of the runs have a recording: there is nothing to show side by \

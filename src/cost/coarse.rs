@@ -1,4 +1,4 @@
-//! What shortened runs leave out, seen on two coarse meshes that run to the end as well.
+//! Estimates the effect of shortening runs, from runs on two coarse meshes to the scene's end.
 
 use super::CostError;
 use super::knobs::cells_near;
@@ -7,23 +7,24 @@ use super::measure::{Pilot, Sample, Target, run};
 use super::survey::{ROUNDING, planned};
 use crate::scene::{Scene, SceneSource};
 
-/// Cells of the meshes, relative to the scene's own.
+/// Numbers of cells of the two meshes, relative to that of the scene.
 const COARSE: [f64; 2] = [1.0 / 3.0, 0.5];
 
-/// Seconds of a pilot.
+/// Wall-clock time of a pilot run, s.
 const PATIENCE: f64 = 0.3;
 
 /// Two coarse runs to the end of the scene.
 pub struct Coarse {
+    /// `accuracy.cells` of the two runs, coarse to fine.
     pub cells: [u32; 2],
     ends: [Sample; 2],
-    /// Seconds that the finer one took, over those that its first steps forecast: steps grow or
-    /// shrink as a run goes on, on fine meshes much as on coarse ones.
+    /// CPU time of the finer run, divided by the time extrapolated from its first steps. Time steps
+    /// grow or shrink during a run, similarly on fine and coarse meshes.
     pub forecast: f64,
 }
 
 impl Coarse {
-    /// Runs them; `None` if that is forecast to take more than `most` seconds, or if one fails.
+    /// Runs both. `None` if they are expected to take more than `most` seconds, or if one fails.
     pub fn run(
         source: &SceneSource,
         scene: &Scene,
@@ -32,7 +33,7 @@ impl Coarse {
         most: f64,
     ) -> Result<Option<Coarse>, CostError> {
         let cells = COARSE.map(|f| cells_near(scene.accuracy.cells, f));
-        // Cells count to the power two, and once more for the steps.
+        // The time grows with the square of the cells per side, and with the number of steps.
         let guess: f64 = COARSE.iter().map(|f| f.powf(2.5)).sum::<f64>() * pilot.whole();
         if cells[0] == cells[1] || guess > most {
             return Ok(None);
@@ -51,8 +52,8 @@ impl Coarse {
         Ok(Some(Coarse { cells, ends: [rough, fine], forecast }))
     }
 
-    /// How the error grows from an earlier end to the scene's, and how many times longer a run to
-    /// there takes; `near` holds the same runs to the earlier end.
+    /// Growth of the error from an earlier end to the scene's end, and the ratio of CPU times of
+    /// these two runs. `near` holds the same runs to the earlier end.
     pub fn beyond(&self, near: [&Sample; 2], target: &Target) -> (Growth, f64) {
         let difference = |[a, b]: [&Sample; 2]| {
             let scale = target.size(b.value.iter().copied()).max(target.floor);

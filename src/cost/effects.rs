@@ -1,32 +1,34 @@
-//! What each effect takes of a step, measured.
+//! Measures the share of each physical effect in the time of a step.
 //!
-//! An effect that can be taken out of the scene is priced by a pair: the scene with and without it
-//! step in turn, and its share is `1 - (step without)/(step with)`, medians of processor time. One
-//! that drives the flow cannot be taken out; its share is that of its own stage.
+//! If an effect can be removed from the scene, runs with and without it take steps alternately, and
+//! the share is `1 - (step without)/(step with)`, medians of CPU time. An effect that drives the
+//! flow cannot be removed; its share is that of its own phase of the step.
 
 use super::measure::{median, timed};
 use crate::plan::{EffectKind, EffectList, Plan, StepTime, resolve};
 use crate::scene::Scene;
-use crate::sim::row::Phases;
+use crate::sim::phases::Phases;
 use crate::sim::{self, Run, SimError};
 use std::sync::Arc;
 
-/// Seconds of a processor for a step, medians.
+/// Median CPU times of a step with and without an effect, s.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
+    /// Time of a step with the effect, s.
     pub with: f64,
+    /// Time of a step without the effect, s.
     pub without: f64,
 }
 
 impl Pair {
-    /// Of a step with the effect.
+    /// Share of the effect in a step that includes it.
     pub fn share(&self) -> f64 {
         1.0 - self.without / self.with
     }
 }
 
-/// The scene without an effect; `None` for what every scene has, what drives the flow, and what
-/// its matter is.
+/// The scene without an effect. `None` for effects that every scene has, that drive the flow, or
+/// that belong to the material.
 pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
     let mut s = scene.clone();
     match effect {
@@ -59,12 +61,12 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
         EffectKind::Acceleration | EffectKind::CutCells => return None,
         EffectKind::CarriedViscosity | EffectKind::CarriedDensity => return None,
     }
-    // What it was made for may be gone with the effect.
+    // The quantity of interest may have been removed with the effect.
     s.interest = None;
     Some(s)
 }
 
-/// A run that is timed step by step.
+/// A run whose steps are timed.
 struct Timed {
     run: Box<dyn Run>,
     seconds: Vec<f64>,
@@ -72,7 +74,7 @@ struct Timed {
 }
 
 impl Timed {
-    /// Starts, and takes the first step, which solves twice and is not counted.
+    /// Starts a run and takes its first step, which solves twice and is not timed.
     fn start(plan: &Arc<Plan>) -> Result<Timed, SimError> {
         let mut run = sim::start(plan.clone())?;
         if !run.is_finished() {
@@ -89,13 +91,13 @@ impl Timed {
         Ok(())
     }
 
-    /// Median seconds of a step; not a number if the run was over at once.
+    /// Median CPU time of a step, s; NaN if no step was timed.
     fn median(&self) -> f64 {
         median(self.seconds.clone()).unwrap_or(f64::NAN)
     }
 }
 
-/// Steps of two plans in turn.
+/// Median step times of two plans, whose runs take steps alternately.
 pub fn pair(with: &Arc<Plan>, without: &Arc<Plan>, steps: u32) -> Result<Pair, SimError> {
     let (mut a, mut b) = (Timed::start(with)?, Timed::start(without)?);
     for _ in 0..steps {
@@ -108,8 +110,8 @@ pub fn pair(with: &Arc<Plan>, without: &Arc<Plan>, steps: u32) -> Result<Pair, S
     Ok(Pair { with: a.median(), without: b.median() })
 }
 
-/// Fills in the measured shares of a plan's effects; `steps` are measured of each run. An effect
-/// whose share is below the noise has a share of zero; one that could not be measured has none.
+/// Measures the shares of a plan's effects over `steps` steps of each run and stores them in
+/// `list`. A share below the noise is zero; an effect that cannot be measured has no share.
 pub fn measure(plan: &Arc<Plan>, list: &mut EffectList, steps: u32) -> Result<(), SimError> {
     let mut base = Timed::start(plan)?;
     while !base.run.is_finished() && base.seconds.len() < steps as usize {
@@ -124,7 +126,7 @@ pub fn measure(plan: &Arc<Plan>, list: &mut EffectList, steps: u32) -> Result<()
     for e in list.effects.iter_mut().filter(|e| e.solved) {
         e.share = match e.kind {
             EffectKind::Flow | EffectKind::CarriedDensity | EffectKind::CarriedViscosity => None,
-            // Made once, at the start.
+            // Computed once, at the start.
             EffectKind::BodyForce => Some(0.0),
             EffectKind::Gravity | EffectKind::Acceleration => Some(phases.weight / total),
             EffectKind::Dye => Some(phases.dye / total),
@@ -140,6 +142,7 @@ pub fn measure(plan: &Arc<Plan>, list: &mut EffectList, steps: u32) -> Result<()
     Ok(())
 }
 
+/// Share of an effect, from runs with and without it; `None` if it cannot be removed.
 fn share_of_pair(plan: &Arc<Plan>, kind: EffectKind, steps: u32) -> Result<Option<f64>, SimError> {
     let other = without(&plan.scene, kind).and_then(|scene| resolve(&scene).ok());
     let Some(other) = other.filter(|p| !p.describe().has(kind)) else { return Ok(None) };
@@ -153,7 +156,7 @@ mod tests {
     use crate::scene::{parse, presets};
 
     #[test]
-    fn what_is_taken_out_is_gone() {
+    fn removed_effects_are_not_solved() {
         for (name, _) in presets::list() {
             let scene = parse(&presets::find(name).expect("listed")).expect("valid");
             let list = resolve(&scene).expect("valid").describe();
@@ -166,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_shares() {
+    fn shares_are_between_zero_and_one() {
         let scene = parse(
             &presets::find("silo")
                 .and_then(|s| s.with_sets(&["accuracy.cells=2".into()]))
@@ -177,7 +180,7 @@ mod tests {
         let mut list = plan.describe();
         measure(&plan, &mut list, 2).expect("runs");
         for e in &list.effects {
-            assert!(e.solved || e.share.is_none(), "{} is left out", e.name);
+            assert!(e.solved || e.share.is_none(), "{} is not solved", e.name);
             assert!(e.share.is_none_or(|s| (0.0..1.0).contains(&s)), "{}: {:?}", e.name, e.share);
         }
         assert!(list.effects.iter().any(|e| e.kind == EffectKind::Rotation && e.share.is_some()));

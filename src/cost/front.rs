@@ -1,28 +1,32 @@
-//! Arithmetic of prices: fits, fronts and what to try next. Pure functions.
+//! Pure functions on errors and times: power-law fits, Pareto fronts and promising combinations.
 
-/// `C h^p`: what one knob adds to the error at a setting of size `h`, 1 for the scene's own.
+/// Power law `C h^p` of the error that a knob adds at size `h`; `h = 1` is the scene's own setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Power {
+    /// Relative error at `h = 1`.
     pub c: f64,
+    /// Convergence rate.
     pub p: f64,
-    /// The rate was seen: two differences or more decided on it.
+    /// True if the rate was fitted to at least two differences.
     pub seen: bool,
-    /// Differences do not lie on the curve: largest ratio to it.
+    /// Largest ratio between a difference and the fit; 1 for a perfect fit.
     pub misfit: f64,
 }
 
 impl Power {
+    /// Relative error at size `h`.
     pub fn at(&self, h: f64) -> f64 {
         self.c * h.powf(self.p)
     }
 }
 
-/// Slower rates are not believed: differences between neighbouring settings would be blown up to
-/// errors many times as large.
+/// Range of rates used in fits. With slower rates, differences between neighbouring levels would be
+/// extrapolated to much larger errors.
 const RATES: [f64; 2] = [0.8, 4.5];
 
-/// Fits `d = C (h^p - f^p)` to differences `d` of settings of sizes `h` from that of size `f`.
-/// With one difference the rate is `expected`. `None` if nothing differs.
+/// Fits `d = C (h^p - f^p)` to pairs `(h, d)`: differences `d` between results at size `h` and at
+/// the finest size `f`. With a single difference the rate is `expected`. `None` without
+/// differences.
 pub fn fit(finest: f64, differences: &[(f64, f64)], expected: f64) -> Option<Power> {
     let used: Vec<(f64, f64)> =
         differences.iter().copied().filter(|&(h, d)| h > finest * 1.0001 && d > 1e-14).collect();
@@ -45,10 +49,11 @@ pub fn fit(finest: f64, differences: &[(f64, f64)], expected: f64) -> Option<Pow
     tried.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(power, _)| power)
 }
 
-/// Less than this share of an error is no gain that anyone would pay for.
+/// Smallest relative reduction of the error that counts as an improvement.
 const GAIN: f64 = 0.03;
 
-/// Indices that no other index beats in both error and seconds, ascending in seconds.
+/// Pareto front: indices of points `(error, seconds)` that no other point beats in both, ascending
+/// in seconds.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> =
         (0..points.len()).filter(|&i| points[i].0.is_finite() && points[i].1.is_finite()).collect();
@@ -66,12 +71,12 @@ pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     order
 }
 
-/// Nearer points of a front say nothing about a slope.
+/// Largest ratio of two errors from which a slope is computed.
 const APART: f64 = 0.75;
 
-/// Seconds that halving the error adds to each point `(error, seconds)` of a front, by the slope
-/// `d ln seconds / d ln error` to the next one that is clearly better; the last ones take the slope
-/// from the one before that is clearly worse.
+/// Additional seconds needed to halve the error at each point `(error, seconds)` of a front, from
+/// the slope `d ln seconds / d ln error` to the next point that is clearly more accurate. The last
+/// points use the slope from the previous point that is clearly less accurate.
 pub fn next_halving(front: &[(f64, f64)]) -> Vec<Option<f64>> {
     let slope = |a: (f64, f64), b: (f64, f64)| {
         let s = (b.1 / a.1).ln() / (a.0 / b.0).ln();
@@ -93,13 +98,15 @@ pub fn next_halving(front: &[(f64, f64)]) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// What is known of a setting of a knob: error it adds, seconds relative to the scene's own.
+/// A level of a knob: the relative error that it adds, and its time relative to the scene's own
+/// setting.
 pub type Offer = (f64, f64);
 
-/// Most combinations looked at.
+/// Largest number of combinations considered.
 const MOST: usize = 200_000;
 
-/// Settings, one index per knob, that the model calls a front, cheapest first.
+/// Pareto front of the model over all combinations: one level index per knob, fastest first. Errors
+/// of the knobs are added, times multiplied.
 pub fn model_front(offers: &[Vec<Offer>]) -> Vec<Vec<usize>> {
     let total = offers.iter().try_fold(1usize, |n, o| n.checked_mul(o.len()));
     if total.is_none_or(|n| n > MOST || n == 0) {
@@ -122,7 +129,7 @@ pub fn model_front(offers: &[Vec<Offer>]) -> Vec<Vec<usize>> {
     front(&points).into_iter().map(|i| all[i].0.clone()).collect()
 }
 
-/// At most `count` members of a list, spread evenly over it, both ends included.
+/// At most `count` elements of a list, evenly spaced, both ends included.
 pub fn spread<T: Clone>(list: &[T], count: usize) -> Vec<T> {
     if list.len() <= count {
         return list.to_vec();
@@ -138,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_power_is_found_again() {
+    fn a_power_law_is_recovered() {
         let (c, p, f) = (0.03f64, 2.0f64, 0.7f64);
         let d = |h: f64| (h, c * (h.powf(p) - f.powf(p)));
         let found = fit(f, &[d(2.0), d(1.4), d(1.0), (0.7, 0.0)], 1.0).expect("differs");
@@ -150,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn the_front_has_what_nothing_beats() {
+    fn the_front_has_all_points_that_are_not_dominated() {
         let points =
             [(0.1, 1.0), (0.05, 2.0), (0.06, 3.0), (0.2, 0.5), (0.2, 0.6), (f64::NAN, 0.1)];
         assert_eq!(front(&points), [3, 0, 1]);
@@ -169,8 +176,8 @@ mod tests {
     }
 
     #[test]
-    fn the_model_buys_where_it_is_cheap() {
-        // The second knob is nearly free: nobody should take its coarse setting to save time.
+    fn the_model_refines_where_it_is_cheap() {
+        // The second knob takes almost no time, so its coarse level is never worth while.
         let offers =
             vec![vec![(0.4, 0.25), (0.1, 1.0), (0.025, 4.0)], vec![(0.5, 0.99), (0.01, 1.0)]];
         let found = model_front(&offers);
@@ -179,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn spreads() {
+    fn spread_is_even() {
         assert_eq!(spread(&[1, 2, 3, 4, 5, 6, 7], 3), [1, 4, 7]);
         assert_eq!(spread(&[1, 2], 3), [1, 2]);
     }

@@ -1,12 +1,12 @@
-//! The settings that buy accuracy, and the values of each that are tried.
+//! The settings that affect accuracy (knobs), and the values (levels) that are tried for each.
 
 use crate::plan::{Plan, resolve};
 use crate::scene::{Integrator, Moment, Quadrature, Scene, SceneError, Scope};
 
-/// All knobs: name, keys of the scene, what is tried.
+/// All knobs: name, scene keys, and description of the levels that are tried.
 pub const KNOBS: [(&str, &str, &str); 7] = [
     ("cells", "accuracy.cells", "fewer and more cells, by factors of sqrt 2"),
-    ("grading", "mesh.grading", "none, and cells smaller or larger where the mesh is graded"),
+    ("grading", "mesh.grading", "none, and smaller or larger cells where the mesh is graded"),
     ("particles", "accuracy.particles_per_cell", "square numbers from 4"),
     ("quadrature", "accuracy.quadrature", "particles, mixture, laminate: the cut-cell rule"),
     ("time step", "time.courant, time.strain, time.max_step", "all three by one factor"),
@@ -14,41 +14,45 @@ pub const KNOBS: [(&str, &str, &str); 7] = [
     ("tolerance", "accuracy.tolerance", "1e-5, 1e-8 and the scene's own"),
 ];
 
-/// A setting of a knob.
+/// A value of a knob.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
-    /// `cells 8`
+    /// Name, such as `cells 8`.
     pub label: String,
-    /// Sets that make it; none for the scene's own.
+    /// `--set` assignments that select it; empty for the scene's own setting.
     pub sets: Vec<String>,
-    /// Size relative to the scene's own: smaller is finer; `None` for a choice without size.
+    /// Size relative to the scene's own setting; smaller is finer. `None` for a choice.
     pub size: Option<f64>,
 }
 
-/// A knob and its settings, coarse to fine where they have sizes.
+/// A knob and its levels, coarse to fine where they have sizes.
 #[derive(Clone, Debug)]
 pub struct Knob {
+    /// Name, as in [`KNOBS`].
     pub name: &'static str,
+    /// Levels that are tried.
     pub levels: Vec<Level>,
-    /// Index of the scene's own setting.
+    /// Index of the scene's own level.
     pub base: usize,
-    /// Rate of the error where too little was seen to tell.
+    /// Convergence rate assumed if too few levels were run to measure it.
     pub expected: f64,
 }
 
-/// All knobs that a scene has.
+/// The knobs of a scene and their levels.
 #[derive(Clone, Debug)]
 pub struct Design {
+    /// Knobs in the order of [`KNOBS`].
     pub knobs: Vec<Knob>,
 }
 
-/// A setting of a size with its sets.
+/// A level with a size.
 fn sized(label: String, size: f64, sets: Vec<String>) -> Level {
     let sets = if size == 1.0 { vec![] } else { sets };
     Level { label, sets, size: Some(size) }
 }
 
 impl Knob {
+    /// A knob from its levels. `None` if it has only one, or none of the scene itself.
     fn new(name: &'static str, mut levels: Vec<Level>, expected: f64) -> Option<Knob> {
         levels.sort_by(|a, b| b.size.unwrap_or(0.0).total_cmp(&a.size.unwrap_or(0.0)));
         levels.dedup_by(|a, b| a.label == b.label);
@@ -57,17 +61,18 @@ impl Knob {
     }
 }
 
-/// Whole numbers near `n` times powers of `sqrt 2`, even if `n` is: an interface that lies on a
-/// mesh line of the scene's own mesh stays on one.
+/// Whole number near `n * factor`. It is even if `n` is even, so that an interface on a mesh line
+/// of the scene's own mesh stays on a mesh line.
 pub(super) fn cells_near(n: u32, factor: f64) -> u32 {
     let wanted = f64::from(n) * factor;
     let even = 2.0 * (0.5 * wanted).round();
-    // Of few cells the next even number may be quite another resolution.
+    // For few cells the nearest even number may be too far off.
     let near = (even - wanted).abs() <= 0.05 * wanted;
     let cells = if n.is_multiple_of(2) && near { even } else { wanted.round() };
     (cells as u32).max(2)
 }
 
+/// The number of cells.
 fn cells(scene: &Scene, factors: &[f64]) -> Option<Knob> {
     let n = scene.accuracy.cells;
     let levels = factors
@@ -78,14 +83,14 @@ fn cells(scene: &Scene, factors: &[f64]) -> Option<Knob> {
             sized(format!("cells {c}"), size, vec![format!("accuracy.cells={c}")])
         })
         .collect();
-    // Discharges converge at first order, smooth fields at third: seen rates replace this.
+    // Discharges converge at first order, smooth fields at third. Measured rates replace this one.
     Knob::new("cells", levels, 1.5)
 }
 
-/// Factor of the default grading, as `plan` has it.
+/// Factor of the default grading, the same as in `plan`.
 const DEFAULT_GRADING: f64 = 12.0;
 
-/// Sets that multiply all grading factors; `None` where the scene is not graded.
+/// `--set` assignments that multiply all grading factors; `None` if the mesh is not graded.
 fn graded(scene: &Scene, scope: &Scope, factor: f64) -> Result<Option<Vec<String>>, SceneError> {
     match &scene.mesh.grading {
         None => {
@@ -102,7 +107,7 @@ fn graded(scene: &Scene, scope: &Scope, factor: f64) -> Result<Option<Vec<String
         Some(list) => {
             let mut sets = vec![];
             for (i, g) in list.iter().enumerate() {
-                // Cells cannot grow towards what they are graded to.
+                // Cells must not grow towards the place of refinement.
                 let value = (g.factor.eval(scope)? * factor).max(1.0);
                 sets.push(format!("mesh.grading[{i}].factor={value}"));
             }
@@ -111,6 +116,7 @@ fn graded(scene: &Scene, scope: &Scope, factor: f64) -> Result<Option<Vec<String
     }
 }
 
+/// The grading factors of the mesh.
 fn grading(scene: &Scene, scope: &Scope) -> Result<Option<Knob>, SceneError> {
     if graded(scene, scope, 1.0)?.is_none() {
         return Ok(None);
@@ -132,6 +138,7 @@ fn grading(scene: &Scene, scope: &Scope) -> Result<Option<Knob>, SceneError> {
     Ok(Knob::new("grading", levels, 1.0))
 }
 
+/// The number of particles per cell.
 fn particles(scene: &Scene) -> Option<Knob> {
     let n = scene.accuracy.particles_per_cell;
     let mut counts = vec![4, 9, 16, 25];
@@ -147,7 +154,7 @@ fn particles(scene: &Scene) -> Option<Knob> {
     Knob::new("particles", levels, 1.0)
 }
 
-/// Settings of a choice, in the order given.
+/// A choice without size, its levels in the order given.
 fn choice<T: PartialEq + Copy>(
     name: &'static str,
     key: &str,
@@ -162,6 +169,7 @@ fn choice<T: PartialEq + Copy>(
     Knob::new(name, words.iter().map(level).collect(), 1.0)
 }
 
+/// The quadrature rule; `None` if all particles have the same properties.
 fn quadrature(scene: &Scene, plan: &Plan) -> Option<Knob> {
     let varied = plan.state.materials.len() > 1
         || plan.effects.directors
@@ -178,7 +186,7 @@ fn quadrature(scene: &Scene, plan: &Plan) -> Option<Knob> {
     choice("quadrature", "accuracy.quadrature", scene.accuracy.quadrature, &words)
 }
 
-/// Sets that multiply the limits of the time step.
+/// `--set` assignments that multiply the limits of the time step.
 fn stepped(scene: &Scene, scope: &Scope, factor: f64) -> Result<Vec<String>, SceneError> {
     let mut sets = vec![
         format!("time.courant={}", scene.time.courant * factor),
@@ -190,6 +198,7 @@ fn stepped(scene: &Scene, scope: &Scope, factor: f64) -> Result<Vec<String>, Sce
     Ok(sets)
 }
 
+/// The limits of the time step.
 fn step(scene: &Scene, scope: &Scope) -> Result<Option<Knob>, SceneError> {
     let mut levels = vec![];
     for factor in [4.0, 2.0, 1.0, std::f64::consts::FRAC_1_SQRT_2] {
@@ -203,6 +212,7 @@ fn step(scene: &Scene, scope: &Scope) -> Result<Option<Knob>, SceneError> {
     Ok(Knob::new("time step", levels, 2.0))
 }
 
+/// The tolerance of the solver.
 fn tolerance(scene: &Scene) -> Option<Knob> {
     let own = scene.accuracy.tolerance;
     let levels = [1e-5, 1e-8, own]
@@ -217,12 +227,12 @@ fn tolerance(scene: &Scene) -> Option<Knob> {
     Knob::new("tolerance", levels, 1.0)
 }
 
-/// Finer settings of everything that has a size, by a ratio (coarser below 1).
+/// `--set` assignments that refine every knob with a size by a ratio (coarsen if below 1).
 pub fn rung(scene: &Scene, ratio: f64, at: Moment) -> Result<Vec<String>, SceneError> {
     let scope = Scope::new(scene)?;
     let mut sets = vec![format!("accuracy.cells={}", cells_near(scene.accuracy.cells, ratio))];
     let side = f64::from(scene.accuracy.particles_per_cell).sqrt();
-    // One more or less along a side: particles refine with the cells already.
+    // One particle more or less along a side, since particles are refined with the cells.
     let side = (side + (ratio - 1.0).signum()).max(2.0).round();
     sets.push(format!("accuracy.particles_per_cell={}", side * side));
     if let Some(more) = graded(scene, &scope, ratio)? {
@@ -235,7 +245,8 @@ pub fn rung(scene: &Scene, ratio: f64, at: Moment) -> Result<Vec<String>, SceneE
 }
 
 impl Design {
-    /// The knobs that a scene has when it is interested in a moment; `factors` of the cells.
+    /// The knobs that affect a scene's quantity of interest at time `at`. `factors` are the numbers
+    /// of cells to try, relative to that of the scene.
     pub fn new(
         scene: &Scene,
         plan: &Plan,
@@ -259,27 +270,28 @@ impl Design {
         Ok(Design { knobs: knobs.into_iter().flatten().collect() })
     }
 
-    /// The scene's own settings, an index per knob.
+    /// The scene's own settings: the index of the level of each knob.
     pub fn base(&self) -> Vec<usize> {
         self.knobs.iter().map(|k| k.base).collect()
     }
 
-    /// The scene's own settings but for one knob.
+    /// The scene's own settings, except for one knob.
     pub fn one(&self, knob: usize, level: usize) -> Vec<usize> {
         let mut settings = self.base();
         settings[knob] = level;
         settings
     }
 
+    /// `--set` assignments of some settings.
     pub fn sets(&self, settings: &[usize]) -> Vec<String> {
         self.knobs.iter().zip(settings).flat_map(|(k, &i)| k.levels[i].sets.clone()).collect()
     }
 
-    /// What differs from the scene's own settings, in words.
+    /// Levels that differ from the scene's own settings, in words.
     pub fn label(&self, settings: &[usize]) -> String {
         let other = self.knobs.iter().zip(settings).filter(|(k, i)| k.base != **i);
         let words: Vec<&str> = other.map(|(k, &i)| k.levels[i].label.as_str()).collect();
-        if words.is_empty() { "as the scene says".into() } else { words.join(", ") }
+        if words.is_empty() { "scene settings".into() } else { words.join(", ") }
     }
 }
 
@@ -296,10 +308,10 @@ mod tests {
     }
 
     #[test]
-    fn knobs_are_those_that_act() {
+    fn only_knobs_with_an_effect_are_varied() {
         let names = |d: &Design| d.knobs.iter().map(|k| k.name).collect::<Vec<_>>();
         let (_, silo) = design("silo", Moment::End);
-        assert_eq!(names(&silo), KNOBS.map(|k| k.0), "the silo has them all");
+        assert_eq!(names(&silo), KNOBS.map(|k| k.0), "the silo has all knobs");
         let (_, couette) = design("couette_cosserat", Moment::Start);
         assert_eq!(names(&couette), ["cells", "grading", "particles", "tolerance"]);
     }

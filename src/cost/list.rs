@@ -1,4 +1,4 @@
-//! The price list: what is printed, kept on disk and bought from.
+//! The cost table: it is printed, stored on disk and used to choose settings.
 
 use super::reference::Kind;
 use crate::scene::{Scene, scene_hash};
@@ -6,155 +6,192 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// Version of the format.
+/// Version of the file format.
 pub const SCHEMA: u32 = 2;
 
-/// Everything that was found.
+/// A cost table: accuracy and time of a scene for many settings.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct List {
+    /// Version of the file format, [`SCHEMA`].
     pub schema: u32,
+    /// Name of the scene.
     pub scene: String,
+    /// Version of grainscope.
     pub version: String,
+    /// True for a table of [`Effort::Quick`](super::Effort::Quick).
     pub quick: bool,
+    /// Machine on which the times were measured.
     pub machine: Machine,
-    /// What the errors are of: `volume through "outflow" at the end`.
+    /// Quantity whose error is measured, such as ``volume through `outflow` at the end``.
     pub quantity: String,
+    /// Norm of the error.
     pub norm: String,
-    /// SI
+    /// Smallest scale of relative errors, SI units.
     pub floor: f64,
-    /// End of the runs that were measured, and of the scene, s.
+    /// End time of the measured runs, and of the scene, s.
     pub horizon: [f64; 2],
-    /// Sets that shorten the scene to what was measured.
+    /// `--set` assignments that shorten the scene to the measured runs.
     pub shortened: Vec<String>,
+    /// Reference against which errors are measured.
     pub reference: ReferenceLine,
+    /// Timing noise of equal runs.
     pub noise: Noise,
-    /// Relative spread over placements and seeds; `None` if there was no time to see it.
+    /// Relative spread over placements and seeds; `None` if there was no time to measure it.
     pub sampling: Option<f64>,
+    /// Uncertainties of the gauges.
     pub gauges: Vec<GaugeLine>,
+    /// Error contributions of the knobs.
     pub knobs: Vec<KnobLine>,
-    /// All that ran, the scene's own settings first.
+    /// All candidates that were run, the scene's own settings first.
     pub entries: Vec<Entry>,
-    /// Indices of `entries`, cheapest first.
+    /// Indices in `entries` of the Pareto front, fastest first.
     pub front: Vec<usize>,
-    /// What did not run through, and why.
+    /// Runs that failed, with reasons.
     pub failed: Vec<String>,
-    /// What was left out to keep the time.
+    /// Runs that were left out to keep the time limit.
     pub skipped: Vec<String>,
-    /// Seconds of a whole run of the scene over those of what was measured.
+    /// Time of a whole run of the scene, divided by that of a measured run.
     pub whole_run: f64,
-    /// Where runs were shortened: difference of two coarse runs at the scene's end over that at the
-    /// horizon, and their cells; `None` if there was no time for them.
+    /// Growth of the error after the horizon, if runs were shortened: difference of two coarse runs
+    /// at the scene's end over that at the horizon. `None` if there was no time for these runs.
     pub growth: Option<Growth>,
-    /// Seconds that the list took to make.
+    /// Wall-clock time in which the table was made, s.
     pub made_in: f64,
 }
 
+/// The machine on which a table was made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
+    /// Host name.
     pub name: String,
+    /// Model name of the processor.
     pub processor: String,
+    /// Number of logical processors.
     pub processors: usize,
     /// The processor that runs were pinned to.
     pub pinned: Option<String>,
-    /// Processor time is told by the system, not taken from the wall's clock.
+    /// True if the system reports CPU times; otherwise they are wall-clock times.
     pub cpu_clock: bool,
 }
 
-/// How an error grows from the horizon to the end of the scene.
+/// Growth of the error from the horizon to the end of the scene.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Growth {
+    /// Difference of two coarse runs at the scene's end over that at the horizon.
     pub factor: f64,
+    /// `accuracy.cells` of the two runs.
     pub cells: [u32; 2],
 }
 
 impl Growth {
-    /// Promises are for the end: errors that shrink later are promised as they were measured.
+    /// Factor on error bounds, which hold at the scene's end. Errors that shrink are not scaled.
     pub fn of_promises(&self) -> f64 {
         self.factor.max(1.0)
     }
 }
 
+/// The reference of a table.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ReferenceLine {
+    /// Origin of the reference.
     pub kind: Kind,
-    /// If it is one number, SI.
+    /// Value in SI units, if it is a single number.
     pub value: Option<f64>,
-    /// Relative.
+    /// Relative uncertainty.
     pub uncertainty: f64,
+    /// Observed convergence rate.
     pub rate: Option<f64>,
 }
 
-/// Slowest over fastest of the same run, less 1.
+/// Timing noise: the slowest over the fastest of several equal runs, minus 1.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Noise {
+    /// Noise of the CPU time.
     pub cpu: f64,
+    /// Noise of the wall-clock time.
     pub wall: f64,
+    /// Number of runs.
     pub repeats: usize,
 }
 
+/// Uncertainties of a gauge.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GaugeLine {
+    /// Name of the gauge.
     pub name: String,
-    /// Its volume is what the list is about.
+    /// True if its volume is the quantity whose error is measured.
     pub priced: bool,
-    /// Relative, of the reference's volume.
+    /// Relative uncertainty of the reference volume.
     pub uncertainty: f64,
-    /// Relative.
+    /// Relative spread over placements and seeds.
     pub sampling: f64,
 }
 
+/// Error contributions of a knob.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct KnobLine {
+    /// Name of the knob.
     pub name: String,
-    /// Settings and the error each is estimated to add.
+    /// Levels, and the relative error that each is estimated to add.
     pub adds: Vec<(String, f64)>,
-    /// Observed rate; absent for choices and where one difference only was seen.
+    /// Observed convergence rate; `None` for choices and if only one difference is known.
     pub rate: Option<f64>,
-    /// Largest ratio of a difference to the fitted power; near 1 is regular.
+    /// Largest ratio of a difference to the fitted power law; near 1 the convergence is regular.
     pub misfit: Option<f64>,
 }
 
-/// A candidate.
+/// A candidate that was run: settings, error and time.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Entry {
+    /// Settings that differ from those of the scene, in words.
     pub label: String,
+    /// `--set` assignments that give these settings.
     pub sets: Vec<String>,
-    /// Measured against the reference, relative.
+    /// Measured relative error against the reference.
     pub error: f64,
-    /// What is promised. Against an exact solution the measured error; else no less than the root
-    /// of the sum of squares of what the knobs add, plus the reference's uncertainty: errors of
-    /// different sign may cancel, and nobody can rely on that.
+    /// Relative error bound. Against an exact solution it is the measured error. Otherwise it is
+    /// the larger of the measured error and the root of the sum of squares of the contributions of
+    /// the knobs, plus the uncertainty of the reference: contributions may cancel by chance. It is
+    /// multiplied by [`Growth::of_promises`].
     pub promised: f64,
-    /// The measured error is far below what the knobs add: they cancel.
+    /// True if the measured error is far below the contributions of the knobs, because they cancel.
     pub lucky: bool,
-    /// Best of the repeats.
+    /// Smallest CPU time of the repeats, s.
     pub cpu: f64,
+    /// Smallest wall-clock time of the repeats, s.
     pub wall: f64,
+    /// Number of equal runs.
     pub repeats: usize,
+    /// Number of steps.
     pub steps: u64,
+    /// Number of unknowns of a solution.
     pub unknowns: usize,
+    /// Number of particles at the end.
     pub particles: usize,
+    /// Names of the phases, and their wall-clock times, s.
     pub phases: Vec<(String, f64)>,
-    /// What each knob adds to the error, largest first.
+    /// Relative error that each knob adds, largest first.
     pub split: Vec<(String, f64)>,
-    /// Relative errors of the gauges' volumes.
+    /// Relative errors of the volumes through the gauges.
     pub gauge_errors: Vec<f64>,
-    /// Seconds that the next halving of the error costs on top; front only.
+    /// Additional CPU time needed to halve the error, s; only on the Pareto front.
     pub next_halving: Option<f64>,
 }
 
 impl Entry {
+    /// Name of the knob that contributes most to the error.
     pub fn limiting(&self) -> &str {
         self.split.first().filter(|s| s.1 > 0.0).map_or("nothing", |s| &s.0)
     }
 }
 
 impl List {
+    /// Entries of the Pareto front, fastest first.
     pub fn front(&self) -> impl Iterator<Item = &Entry> {
         self.front.iter().map(|&i| &self.entries[i])
     }
 
-    /// What is not on the front, dearest first.
+    /// Entries that are not on the Pareto front, slowest first.
     pub fn dominated(&self) -> Vec<&Entry> {
         let mut list: Vec<&Entry> = (0..self.entries.len())
             .filter(|i| !self.front.contains(i))
@@ -164,38 +201,40 @@ impl List {
         list
     }
 
-    /// The cheapest entry that is as good and no dearer.
+    /// The fastest entry of the front that is at least as accurate and no slower.
     pub fn better(&self, than: &Entry) -> Option<&Entry> {
         self.front().find(|e| e.promised <= than.promised && e.cpu <= than.cpu)
     }
 
-    /// Seconds of a processor that a whole run of an entry is expected to take.
+    /// Expected CPU time of a whole run with the settings of an entry, s.
     pub fn expected_seconds(&self, entry: &Entry) -> f64 {
         entry.cpu * self.whole_run
     }
 
-    /// The cheapest entry that keeps an accuracy; else the most accurate.
+    /// The fastest entry whose error bound is at most `wanted`; otherwise `Err` with the most
+    /// accurate one.
     pub fn for_accuracy(&self, wanted: f64) -> Result<&Entry, Option<&Entry>> {
         let good = self.front().find(|e| e.promised <= wanted);
         good.ok_or_else(|| self.front().min_by(|a, b| a.promised.total_cmp(&b.promised)))
     }
 
-    /// Seconds of a step, start and all.
+    /// Mean CPU time of a step of an entry, start included, s.
     pub fn step_seconds(&self, entry: &Entry) -> f64 {
         entry.cpu / (entry.steps + 1) as f64
     }
 
-    /// The most accurate entry whose whole run is expected to end in time; else the fastest. `pace`:
-    /// how many times longer than then a step takes now.
+    /// The most accurate entry whose whole run is expected to take at most `seconds`; otherwise
+    /// `Err` with the fastest one. `pace` is the ratio of the present time of a step to the
+    /// measured one.
     pub fn for_budget(&self, seconds: f64, pace: f64) -> Result<&Entry, Option<&Entry>> {
-        // Room for recording, plots and the machine's noise.
+        // Margin for recording, plots and timing noise.
         let room = 1.1 * (1.0 + self.noise.wall.min(0.3)) * pace;
         let fits = |e: &&Entry| room * self.expected_seconds(e) <= seconds;
         let best = self.front().filter(fits).min_by(|a, b| a.promised.total_cmp(&b.promised));
         best.ok_or_else(|| self.front().min_by(|a, b| a.cpu.total_cmp(&b.cpu)))
     }
 
-    /// Rows for a spreadsheet.
+    /// The table as CSV.
     pub fn csv(&self) -> String {
         let mut out = String::from(
             "front,settings,error,promised,cpu_seconds,wall_seconds,repeats,steps,unknowns,\
@@ -228,7 +267,7 @@ impl List {
 }
 
 impl Machine {
-    /// This machine, with what the processors are called.
+    /// This machine.
     pub fn here() -> Machine {
         let line = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
         let info = line("/proc/cpuinfo");
@@ -244,7 +283,7 @@ impl Machine {
     }
 }
 
-/// Where lists are kept: `$XDG_CACHE_HOME/grainscope/cost` or `~/.cache/grainscope/cost`.
+/// Folder of stored tables: `$XDG_CACHE_HOME/grainscope/cost` or `~/.cache/grainscope/cost`.
 pub fn folder() -> Option<PathBuf> {
     let given = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let base = given("XDG_CACHE_HOME").filter(|p| p.is_absolute());
@@ -252,7 +291,7 @@ pub fn folder() -> Option<PathBuf> {
     Some(base.join("grainscope").join("cost"))
 }
 
-/// Name of the file of a list: another scene, program or machine gives another.
+/// File name of a table; it differs for each scene, program and machine.
 pub fn file_name(scene_name: &str, scene_hash: &str, quick: bool) -> String {
     let program = std::env::current_exe().ok().and_then(|p| std::fs::metadata(p).ok());
     let built = program.map(|m| (m.len(), m.modified().ok()));
@@ -268,25 +307,25 @@ pub fn file_name(scene_name: &str, scene_hash: &str, quick: bool) -> String {
     format!("{scene_name}-{hash}{}.json", if quick { "-quick" } else { "" })
 }
 
-/// The list of a scene that was kept here, if there is one.
+/// The stored table of a scene on this machine, if there is one.
 pub fn kept(scene: &Scene, quick: bool) -> Option<List> {
     load(&folder()?.join(file_name(&scene.name, &scene_hash(scene), quick)))
 }
 
-/// A list that was kept. A file that cannot be read is as good as none: it is made again.
+/// Reads a stored table. `None` if the file is missing, invalid or of another format version.
 pub fn load(path: &Path) -> Option<List> {
     let list: List = serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()?;
     let whole = list.front.iter().all(|&i| i < list.entries.len());
     (list.schema == SCHEMA && whole).then_some(list)
 }
 
-/// Keeps a list.
+/// Stores a table in a file.
 pub fn store(path: &Path, list: &List) -> std::io::Result<()> {
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent)?;
     }
     let text = serde_json::to_string_pretty(list)?;
-    // Under another name first: a reader never sees half a list.
+    // Written under another name first, so that no reader finds an incomplete file.
     let part = path.with_extension(format!("{}.part", std::process::id()));
     std::fs::write(&part, text + "\n")?;
     std::fs::rename(&part, path)
@@ -354,7 +393,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn buys_the_cheapest_that_does() {
+    fn the_fastest_settings_that_suffice_are_chosen() {
         let list = list();
         let label = |e: Result<&Entry, Option<&Entry>>| e.map(|e| e.label.clone()).ok();
         assert_eq!(label(list.for_accuracy(0.03)).as_deref(), Some("base"));
@@ -365,7 +404,7 @@ pub(super) mod tests {
         );
         assert_eq!(label(list.for_budget(20.0, 1.0)).as_deref(), Some("fine"));
         assert_eq!(label(list.for_budget(3.0, 1.0)).as_deref(), Some("base"));
-        assert_eq!(label(list.for_budget(20.0, 3.0)).as_deref(), Some("base"), "a slower day");
+        assert_eq!(label(list.for_budget(20.0, 3.0)).as_deref(), Some("base"), "slower steps");
         assert_eq!(
             list.for_budget(0.1, 1.0).expect_err("too little").map(|e| e.label.as_str()),
             Some("coarse")
@@ -375,7 +414,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn is_read_back_as_it_was_written() {
+    fn a_stored_table_is_read_back_unchanged() {
         let folder = crate::testing::TempFolder::new().expect("temporary folder");
         let path = folder.path().join("a/b.json");
         store(&path, &list()).expect("written");
@@ -387,7 +426,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn other_scenes_have_other_files() {
+    fn each_scene_has_its_own_file() {
         assert_ne!(file_name("s", "1", false), file_name("s", "2", false));
         assert_ne!(file_name("s", "1", false), file_name("s", "1", true));
         assert_eq!(file_name("s", "1", true), file_name("s", "1", true));

@@ -1,29 +1,34 @@
-//! Running a candidate: what it finds and what it takes.
+//! Runs a candidate and measures its result and its time.
 
 use crate::plan::Plan;
 use crate::scene::{Interest, Interesting, Moment, Norm, Quantity, Scene, SceneError, Scope};
-use crate::sim::row::{Phases, Row};
+use crate::sim::phases::Phases;
+use crate::sim::row::Row;
 use crate::sim::{self, Run, SimError};
 use crate::threads;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Points along a side at which fields are compared: a prime, so that hardly any lies on a mesh
-/// line, where the pressure jumps.
+/// Number of points along a side at which fields are compared. It is prime, so that hardly any
+/// point lies on a mesh line, where the pressure jumps.
 const SIDE: usize = 61;
 
-/// What is measured of a run.
+/// The quantity of interest of a run, and the norm of its error.
 #[derive(Clone, Debug)]
 pub struct Target {
+    /// Quantity whose error is measured.
     pub quantity: Interesting,
+    /// Time at which it is measured.
     pub at: Moment,
+    /// Norm of differences between fields.
     pub norm: Norm,
-    /// SI
+    /// Smallest scale of relative errors, SI units.
     pub floor: f64,
 }
 
 impl Target {
-    /// What the scene declares, or the volume through its first gauge, or its velocity.
+    /// The interest that the scene declares; by default the volume through its first gauge, or its
+    /// velocity field.
     pub fn of(scene: &Scene) -> Result<Target, SceneError> {
         let interest = scene.interest.clone().unwrap_or_else(|| Interest {
             quantity: match scene.gauges.first() {
@@ -38,12 +43,13 @@ impl Target {
         Ok(Target { quantity: interest.quantity, at: interest.at, norm: interest.norm, floor })
     }
 
+    /// True for a field, false for a single number.
     pub fn is_field(&self) -> bool {
         use Interesting::{Pressure, Rotation, Velocity};
         matches!(self.quantity, Velocity | Rotation | Pressure)
     }
 
-    /// In words: `volume through "outflow" at the end`.
+    /// Description, such as ``volume through `outflow` at the end``.
     pub fn title(&self) -> String {
         let what = match &self.quantity {
             Interesting::Gauge(name) => format!("volume through `{name}`"),
@@ -64,7 +70,7 @@ impl Target {
         format!("{what} {when}")
     }
 
-    /// The norm in words.
+    /// Description of the norm.
     pub fn norm_title(&self) -> &'static str {
         match (self.is_field(), self.norm) {
             (false, _) => "relative difference",
@@ -73,7 +79,7 @@ impl Target {
         }
     }
 
-    /// The number a row holds; zero for a field.
+    /// Value of the quantity in a row, SI units; zero for a field.
     pub fn scalar(&self, plan: &Plan, row: &Row) -> f64 {
         let gauge = |name: &str| plan.gauges.iter().position(|g| g.name == name);
         match &self.quantity {
@@ -81,13 +87,13 @@ impl Target {
             Interesting::Rate(name) => gauge(name).map_or(0.0, |k| row.gauges[k].rate),
             Interesting::RmsSpeed => row.rms_speed,
             Interesting::MaxSpeed => row.max_speed,
-            Interesting::Alignment => row.alignment.unwrap_or(0.0),
+            Interesting::Alignment => row.mean_alignment.unwrap_or(0.0),
             Interesting::Dissipation => row.dissipation,
             Interesting::Velocity | Interesting::Rotation | Interesting::Pressure => 0.0,
         }
     }
 
-    /// The quantity at the current instant: one number, or a field's values at the common points.
+    /// Value of the quantity at the current time: one number, or a field at the sample points.
     pub fn read(&self, run: &dyn Run) -> Vec<f64> {
         let plan = run.plan();
         if !self.is_field() {
@@ -96,7 +102,7 @@ impl Target {
         self.field(plan, |p| (run.velocity_at(p), run.pressure_at(p)))
     }
 
-    /// A field's values at the common points, from velocity with rotation, and pressure.
+    /// Values of the field at the sample points. `at` gives velocity with rotation, and pressure.
     pub fn field(&self, plan: &Plan, at: impl Fn([f64; 2]) -> ([f64; 3], f64)) -> Vec<f64> {
         let mut values = Vec::with_capacity(2 * SIDE * SIDE);
         for p in points(plan) {
@@ -108,7 +114,7 @@ impl Target {
             }
         }
         for v in &mut values {
-            // Inside solids there is no field.
+            // Fields are not defined inside solids.
             if !v.is_finite() {
                 *v = 0.0;
             }
@@ -120,7 +126,7 @@ impl Target {
         values
     }
 
-    /// The norm of values or of their difference to others.
+    /// Norm of a list of values.
     pub fn size(&self, values: impl Iterator<Item = f64>) -> f64 {
         match self.norm {
             Norm::Max => values.fold(0.0, |m: f64, v| m.max(v.abs())),
@@ -131,14 +137,14 @@ impl Target {
         }
     }
 
-    /// `|a - b| / scale`
+    /// `|a - b| / scale`; `|a - b|` if the scale is zero.
     pub fn distance(&self, a: &[f64], b: &[f64], scale: f64) -> f64 {
         let size = self.size(a.iter().zip(b).map(|(a, b)| a - b));
         if scale > 0.0 { size / scale } else { size }
     }
 }
 
-/// SI points common to all candidates.
+/// Sample points common to all candidates, m.
 fn points(plan: &Plan) -> impl Iterator<Item = [f64; 2]> {
     let l = plan.units.length;
     let axis = |a: &crate::space::mesh::Axis| (a.start() * l, (a.end() - a.start()) * l);
@@ -147,23 +153,31 @@ fn points(plan: &Plan) -> impl Iterator<Item = [f64; 2]> {
     (0..SIDE * SIDE).map(move |k| [x0 + w * share(k % SIDE), y0 + h * share(k / SIDE)])
 }
 
-/// What a run found and took.
+/// Result and time of a run.
 #[derive(Clone, Debug)]
 pub struct Sample {
+    /// Quantity of interest: one number, or a field at the sample points; SI units.
     pub value: Vec<f64>,
-    /// Volumes that the gauges have counted.
+    /// Volume through each gauge, SI units.
     pub gauges: Vec<f64>,
+    /// Time of the run.
     pub took: Took,
+    /// Wall-clock time of each phase, s.
     pub phases: Phases,
+    /// Number of steps.
     pub steps: u64,
+    /// Number of unknowns of a solution.
     pub unknowns: usize,
+    /// Number of particles at the end.
     pub particles: usize,
 }
 
-/// Seconds of processor and wall.
+/// CPU time and wall-clock time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Took {
+    /// CPU time, s.
     pub cpu: f64,
+    /// Wall-clock time, s.
     pub wall: f64,
 }
 
@@ -174,10 +188,10 @@ impl Took {
     }
 }
 
-/// Seconds that this thread has spent on a processor: what others do on the machine does not
-/// count. `None` where the system does not tell.
+/// CPU time of this thread, s; it does not depend on other programs. `None` if the system does not
+/// report it.
 pub fn thread_seconds() -> Option<f64> {
-    // The kernel brings its account up to date when a thread yields, else with its tick of some
+    // The kernel updates the value when a thread yields, otherwise at its tick of some
     // milliseconds.
     std::thread::yield_now();
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
@@ -185,8 +199,8 @@ pub fn thread_seconds() -> Option<f64> {
     (ns > 0.0).then_some(ns * 1e-9)
 }
 
-/// Runs something on this thread alone and says what it took; without a clock of the processor its
-/// time is the wall's.
+/// Runs `work` on this thread alone and measures its time. If the system reports no CPU time, the
+/// wall-clock time is used for both.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Took) {
     let (wall, cpu) = (Instant::now(), thread_seconds());
     let result = threads::alone(work);
@@ -198,8 +212,8 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Took) {
     (result, Took { cpu, wall })
 }
 
-/// Runs a plan until its target is known. `watch` sees each instant and the time taken so far,
-/// which does not count what `watch` does itself.
+/// Runs a plan until its target is known. `watch` is called at the start and after each step with
+/// the time taken so far, which excludes the time of `watch`.
 pub fn run(
     plan: Arc<Plan>,
     target: &Target,
@@ -234,13 +248,14 @@ pub fn run(
     })
 }
 
-/// The upper median, `None` of nothing.
+/// The upper median; `None` for an empty list.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
 
-/// Seconds of the wall that a step takes on all threads, judged from a few.
+/// Median wall-clock time of the first steps on all threads, s. At least three steps are taken, and
+/// more until `patience` seconds have passed.
 pub fn wall_of_a_step(plan: Arc<Plan>, patience: f64) -> Result<f64, SimError> {
     let clock = Instant::now();
     let mut run = sim::start(plan)?;
@@ -255,20 +270,23 @@ pub fn wall_of_a_step(plan: Arc<Plan>, patience: f64) -> Result<f64, SimError> {
     Ok(median(seconds).unwrap_or(0.0))
 }
 
-/// What a whole run would take, judged from its first steps.
+/// Time of a whole run, extrapolated from its first steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Pilot {
-    /// Seconds of set-up and first solution, of a processor.
+    /// CPU time of the set-up and the first solution, s.
     pub start: f64,
+    /// Median CPU time of a step, s.
     pub step: f64,
+    /// Expected number of steps of the whole run.
     pub steps: f64,
 }
 
-/// Most steps of a pilot.
+/// Largest number of steps of a pilot run.
 const PILOT_STEPS: u32 = 12;
 
 impl Pilot {
-    /// Takes steps until `patience` seconds are over.
+    /// Takes at least three steps, and more until `patience` seconds of wall-clock time have
+    /// passed.
     pub fn run(plan: Arc<Plan>, patience: f64) -> Result<Pilot, SimError> {
         let clock = Instant::now();
         let (run, start) = timed(|| sim::start(plan.clone()));
@@ -285,12 +303,12 @@ impl Pilot {
         }
         let row = run.row();
         let left = if row.dt > 0.0 { (end - row.time) / row.dt } else { 0.0 };
-        // The first step solves twice; the median does not see it.
+        // The first step solves twice; the median ignores it.
         let step = median(cpu).unwrap_or(0.0);
         Ok(Pilot { start: start.cpu, step, steps: f64::from(count) + left.max(0.0) })
     }
 
-    /// Seconds of the whole run.
+    /// CPU time of the whole run, s.
     pub fn whole(&self) -> f64 {
         self.start + self.step * (self.steps + 1.0)
     }
@@ -307,11 +325,11 @@ mod tests {
         assert!((t.distance(&[3.0, 0.0], &[0.0, 4.0], 2.0) - 12.5f64.sqrt() / 2.0).abs() < 1e-15);
         t.norm = Norm::Max;
         assert_eq!(t.distance(&[3.0, 0.0], &[0.0, 4.0], 2.0), 2.0);
-        assert_eq!(t.distance(&[3.0], &[1.0], 0.0), 2.0, "absolute where there is no scale");
+        assert_eq!(t.distance(&[3.0], &[1.0], 0.0), 2.0, "absolute without a scale");
     }
 
     #[test]
-    fn scenes_that_say_nothing_have_a_default() {
+    fn scenes_without_an_interest_have_a_default() {
         let scene = |text: &str| {
             let s = crate::scene::presets::find(text).expect("listed");
             crate::scene::parse(&s).expect("valid")

@@ -1,14 +1,15 @@
-//! What accuracy costs: a price list of a scene.
+//! Measures the accuracy and the CPU time of a scene for many settings: a cost table.
 //!
-//! The settings that buy accuracy ([`knobs`]) are varied one at a time around the scene's own, then
-//! together where a model of error and time says that it pays:
+//! The settings that affect accuracy ([`knobs`]) are varied one at a time around those of the
+//! scene, then in combinations that a model of error and time predicts to be efficient:
 //!
 //! ```text
 //! error(settings) ~ sum over knobs of C_k h_k^p_k       time(settings) ~ product of ratios
 //! ```
-//! Every candidate is run ([`measure`]), its error is taken against an exact solution or a
-//! self-made reference ([`mod@reference`]), and what no other candidate beats in both error and time
-//! is the front ([`front`]). [`effects`] prices what a scene calls for. [`list`] is what is printed, kept and bought from.
+//! Every candidate is run ([`measure`]). Its error is measured against an exact solution or a
+//! computed reference ([`mod@reference`]). Candidates that no other candidate beats in both error
+//! and time form the Pareto front ([`front`]). [`effects`] measures the time that each effect
+//! takes. [`list`] holds the table that is printed, stored on disk and used to choose settings.
 
 mod coarse;
 pub mod effects;
@@ -26,13 +27,16 @@ pub use survey::{Effort, price};
 use crate::scene::SceneError;
 use crate::sim::SimError;
 
-/// Why there is no price list.
+/// The reasons why no cost table can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum CostError {
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// A simulation failed.
     #[error(transparent)]
     Sim(#[from] SimError),
+    /// The scene's own settings or the reference cannot be run; the text says why.
     #[error("{0}")]
     Useless(String),
 }

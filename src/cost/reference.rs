@@ -1,56 +1,61 @@
-//! What errors are measured against: an exact solution, or a ladder of finer settings.
+//! The reference against which errors are measured: an exact solution, or one extrapolated from
+//! three resolutions.
 //!
-//! Three rungs refine every knob by the ratio `r`. With values `q0` (coarse), `q1`, `q2`
+//! The three resolutions differ by the ratio `r` in every knob. With values `q0` (coarse), `q1`,
+//! `q2`
 //!
 //! ```text
 //! r^p = |q1 - q0| / |q2 - q1|        q* = q2 + (q2 - q1)/(r^p - 1)        (Richardson)
 //! ```
-//! Where the differences shrink at a believable rate, `q*` is the reference and half of what was
-//! added to `q2` its uncertainty (rates above 2 are taken as 2); else `q2` is, and its uncertainty
-//! is the larger difference.
+//! If the rate `p` is plausible, `q*` is the reference, and half of its difference to `q2` is the
+//! uncertainty (rates above 2 are taken as 2). Otherwise `q2` is the reference, and the larger of
+//! the two differences is the uncertainty.
 
 use super::measure::Target;
 use serde::{Deserialize, Serialize};
 
-/// Rates that are believed.
+/// Range of plausible convergence rates.
 const RATES: [f64; 2] = [0.5, 4.5];
 
-/// Extrapolation takes no faster rate than this: three rungs often seem to converge faster than
-/// they do, and a fast rate would call its own result certain.
+/// Largest rate used for extrapolation: three resolutions often seem to converge faster than they
+/// do, and a large rate would underestimate the uncertainty.
 const FASTEST: f64 = 2.0;
 
-/// Where the reference is from.
+/// Origin of the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
+    /// An exact solution.
     Exact,
-    /// Richardson extrapolation of three rungs.
+    /// Richardson extrapolation of three resolutions.
     Extrapolated,
-    /// The finest of three rungs: they do not converge regularly.
+    /// The finest of three resolutions, which do not converge at a plausible rate.
     Finest,
 }
 
-/// A reference and how far it may be off.
+/// A reference and its uncertainty.
 #[derive(Clone, Debug)]
 pub struct Reference {
+    /// Origin of the reference.
     pub kind: Kind,
+    /// One number, or a field at the sample points; SI units.
     pub value: Vec<f64>,
-    /// Norm of the value, no less than the floor: errors are relative to it.
+    /// Scale of relative errors: the norm of the value, but at least [`Target::floor`]; SI units.
     pub scale: f64,
-    /// Relative.
+    /// Relative uncertainty.
     pub uncertainty: f64,
-    /// Observed between the rungs.
+    /// Observed convergence rate, if it is finite.
     pub rate: Option<f64>,
 }
 
 impl Reference {
-    /// An exact value.
+    /// A reference from an exact value.
     pub fn exact(value: Vec<f64>, target: &Target) -> Reference {
         let scale = target.size(value.iter().copied()).max(target.floor);
         Reference { kind: Kind::Exact, value, scale, uncertainty: 0.0, rate: None }
     }
 
-    /// From three rungs, coarse to fine, each finer by `ratio`.
+    /// A reference from three resolutions, coarse to fine, each finer by `ratio`.
     pub fn ladder(rungs: [&[f64]; 3], ratio: f64, target: &Target) -> Reference {
         let [q0, q1, q2] = rungs;
         let scale = target.size(q2.iter().copied()).max(target.floor);
@@ -58,7 +63,7 @@ impl Reference {
         let rate = (coarse / fine).ln() / ratio.ln();
         let rate = rate.is_finite().then_some(rate);
         if fine < 1e-14 {
-            // Nothing changes: exact as far as anyone can tell.
+            // The value no longer changes.
             return Reference {
                 kind: Kind::Extrapolated,
                 value: q2.to_vec(),
@@ -80,7 +85,7 @@ impl Reference {
                 kind: Kind::Finest,
                 value: q2.to_vec(),
                 scale,
-                // A rate too good to be true is luck: the small last difference too.
+                // After an implausibly fast rate the small last difference is a coincidence.
                 uncertainty: fine.max(coarse),
                 rate,
             },
@@ -98,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn extrapolates_a_regular_ladder() {
+    fn regular_convergence_is_extrapolated() {
         let q = |h: f64| [2.0 + 0.3 * h * h];
         let found = Reference::ladder([&q(1.5), &q(1.0), &q(1.0 / 1.5)], 1.5, &target());
         assert_eq!(found.kind, Kind::Extrapolated);
@@ -109,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn distrusts_an_irregular_one() {
+    fn irregular_convergence_keeps_the_finest_resolution() {
         let found = Reference::ladder([&[1.0], &[1.1], &[0.9]], 2.0, &target());
         assert_eq!(found.kind, Kind::Finest);
         assert_eq!(found.value, [0.9]);

@@ -1,13 +1,13 @@
-//! A price list in words, for the terminal and for the docs.
+//! Formats a cost table as Markdown for the terminal and the documentation.
 
 use super::knobs::KNOBS;
 use super::list::{Entry, List};
 use super::reference::Kind;
 
-/// Dominated settings shown at most.
+/// Largest number of dominated settings shown.
 const SHOWN: usize = 8;
 
-/// An error as people say it: `0.3 %`.
+/// A relative error in percent, such as `0.30 %`.
 pub fn percent(error: f64) -> String {
     let p = 100.0 * error;
     if p == 0.0 {
@@ -24,7 +24,7 @@ pub fn percent(error: f64) -> String {
     }
 }
 
-/// Seconds as people say them.
+/// A time with a suitable unit, such as `50 ms`, `0.90 s`, `2.2 min` or `2.0 h`.
 pub fn seconds(s: f64) -> String {
     if s < 1e-3 {
         format!("{:.2} ms", 1e3 * s)
@@ -41,14 +41,14 @@ pub fn seconds(s: f64) -> String {
     }
 }
 
-/// Where a list was measured, and how noisy it was there.
+/// The machine on which a table was measured, and its timing noise.
 pub fn provenance(list: &List) -> String {
     let m = &list.machine;
     let pinned = m.pinned.as_ref().map_or("not pinned".into(), |p| format!("pinned to CPU {p}"));
-    let clock = if m.cpu_clock { "" } else { "; no processor clock: seconds are the wall's" };
+    let clock = if m.cpu_clock { "" } else { "; no CPU clock: all times are wall-clock times" };
     format!(
-        "{} x {}, {pinned}; one run at a time; noise of {} equal runs: {} of processor time, {} of \
-         wall time (slowest over fastest, less 1){clock}",
+        "{} x {}, {pinned}; one run at a time; noise of {} equal runs: {} of CPU time, {} of \
+         wall-clock time (slowest over fastest, minus 1){clock}",
         m.processors,
         m.processor,
         list.noise.repeats,
@@ -57,7 +57,7 @@ pub fn provenance(list: &List) -> String {
     )
 }
 
-/// What errors are measured against, in words.
+/// Description of the reference.
 pub fn reference(list: &List) -> String {
     let r = &list.reference;
     let value = r.value.map_or(String::new(), |v| format!(" {v:.6e}"));
@@ -65,25 +65,26 @@ pub fn reference(list: &List) -> String {
     match r.kind {
         Kind::Exact => "the exact solution".into(),
         Kind::Extrapolated => format!(
-            "own reference{value}, finer in every knob and extrapolated (Richardson{rate}), \
-             uncertain by {}",
+            "own reference{value}, from three resolutions of every knob, extrapolated \
+             (Richardson{rate}), uncertain by {}",
             percent(r.uncertainty)
         ),
         Kind::Finest => format!(
-            "own reference{value}, finer in every knob; its rungs do not converge regularly{rate}: \
-             uncertain by {}",
+            "own reference{value}, the finest of three resolutions of every knob, which do not \
+             converge at a plausible rate{rate}: uncertain by {}",
             percent(r.uncertainty)
         ),
     }
 }
 
-/// `1.0 % costs 0.9 s, 0.30 % costs 6.0 s`
+/// One-line summary, such as `1.0 % costs 0.90 s, 0.30 % costs 6.00 s`.
 pub fn slogan(list: &List) -> String {
     let words: Vec<String> =
         list.front().map(|e| format!("{} costs {}", percent(e.promised), seconds(e.cpu))).collect();
     words.join(", ")
 }
 
+/// Description of the measured runs and of the growth of the error after them.
 fn horizon(list: &List) -> String {
     let [short, full] = list.horizon;
     if short == 0.0 {
@@ -91,14 +92,14 @@ fn horizon(list: &List) -> String {
     } else if short < full {
         let growth = match &list.growth {
             Some(g) => format!(
-                "its error is {:.2} times as large (two meshes of {} and {} cells at the end and at \
-                 that time{})",
+                "its error is {:.2} times as large (difference of two meshes of {} and {} cells at \
+                 the end over that at this time; {})",
                 g.factor,
                 g.cells[0],
                 g.cells[1],
-                if g.factor > 1.0 { "; promises count it" } else { "; promises do not" }
+                if g.factor > 1.0 { "accuracies include it" } else { "accuracies exclude it" }
             ),
-            None => "its error is taken to be the same".into(),
+            None => "its error is assumed to be the same".into(),
         };
         format!(
             "runs shortened to t = {short:.4e} of {full:.4e} s; a whole run takes about {:.1} times \
@@ -110,11 +111,11 @@ fn horizon(list: &List) -> String {
     }
 }
 
-/// Share of the limiting knob, and of the next one.
+/// Shares of the knobs in the error of an entry, from 5 % on.
 fn split(entry: &Entry) -> String {
     let total: f64 = entry.split.iter().map(|s| s.1).sum();
     if total <= 0.0 {
-        return "nothing to see".into();
+        return "no measurable error".into();
     }
     let parts: Vec<String> = entry
         .split
@@ -125,7 +126,7 @@ fn split(entry: &Entry) -> String {
     parts.join(", ")
 }
 
-/// Rows of cells under a header, as Markdown that also reads well in a terminal.
+/// A Markdown table whose columns are padded, so that it is readable in a terminal.
 fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
     let mut all: Vec<Vec<String>> = vec![header.iter().map(ToString::to_string).collect()];
     all.extend(rows);
@@ -144,18 +145,18 @@ fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
     out
 }
 
-/// The list as Markdown.
+/// The cost table as Markdown.
 pub fn markdown(list: &List) -> String {
     let effort = if list.quick { ", quick" } else { "" };
     let mut out = format!("## {}: {}{effort}\n\n", list.scene, list.quantity);
     out += &format!("- error: {}", list.norm);
     if list.floor > 0.0 {
-        out += &format!(", to no less than {:e} (SI)", list.floor);
+        out += &format!(", relative to at least {:e} (SI)", list.floor);
     }
     out += &format!(", against {}\n", reference(list));
     out += &format!(
-        "- sampling (other placements, seeds): {}\n",
-        list.sampling.map_or("not seen in the time".into(), percent)
+        "- sampling error (other placements, seeds): {}\n",
+        list.sampling.map_or("not measured, for lack of time".into(), percent)
     );
     out += &format!("- measured: {}\n", horizon(list));
     out += &format!("- machine: {}\n", provenance(list));
@@ -180,7 +181,7 @@ pub fn markdown(list: &List) -> String {
             "measured",
             "CPU",
             "wall",
-            "of",
+            "runs",
             "settings",
             "limited by",
             "error split",
@@ -188,13 +189,14 @@ pub fn markdown(list: &List) -> String {
         ],
         list.front().map(row).collect(),
     );
-    out += "\nAccuracy is what is promised: against an exact solution the measured error; else no less \
-            than the root of the sum of squares of what the knobs add, plus the reference's \
-            uncertainty. A star marks measured errors that are small because those of several knobs \
-            cancel.\n";
+    out += "\nThe accuracy is an error bound. Against an exact solution it is the measured error; \
+            otherwise at least the root of the sum of squares of the contributions of the knobs, \
+            plus the uncertainty of the reference. A star marks measured errors that are small \
+            because contributions of several knobs cancel. CPU and wall are the smallest times of \
+            the runs.\n";
     out += &knobs(list);
     out += &nobody(list);
-    for (what, lines) in [("Failed", &list.failed), ("Left out to keep the time", &list.skipped)] {
+    for (what, lines) in [("Failed", &list.failed), ("Left out for lack of time", &list.skipped)] {
         if !lines.is_empty() {
             out += &format!("\n{what}: {}.\n", lines.join("; "));
         }
@@ -202,7 +204,7 @@ pub fn markdown(list: &List) -> String {
     out
 }
 
-/// What each knob adds, and the observed rates.
+/// Table of the error contributions of the knobs, and the observed convergence rates.
 fn knobs(list: &List) -> String {
     let rows = list
         .knobs
@@ -219,10 +221,10 @@ fn knobs(list: &List) -> String {
             vec![format!("{} (`{keys}`)", k.name), rate, adds.join("; ")]
         })
         .collect();
-    format!("\n{}", table(&["knob", "rate", "adds to the error, others as the scene says"], rows))
+    format!("\n{}", table(&["knob", "rate", "adds to the error, other knobs unchanged"], rows))
 }
 
-/// What nobody should buy.
+/// Table of dominated settings, each with settings that are at least as accurate and no slower.
 fn nobody(list: &List) -> String {
     let all = list.dominated();
     let rows: Vec<Vec<String>> = all
@@ -247,13 +249,13 @@ fn nobody(list: &List) -> String {
         return String::new();
     }
     let shown = if all.len() > rows.len() {
-        format!("{} of {} shown, dearest first", rows.len(), all.len())
+        format!("{} of {} shown, slowest first", rows.len(), all.len())
     } else {
         "all shown".into()
     };
     format!(
-        "\nNobody should buy ({shown}):\n\n{}",
-        table(&["settings", "accuracy", "CPU", "because there is"], rows)
+        "\nDominated settings ({shown}):\n\n{}",
+        table(&["settings", "accuracy", "CPU", "better"], rows)
     )
 }
 
@@ -263,7 +265,7 @@ mod tests {
     use crate::cost::list::tests::list;
 
     #[test]
-    fn errors_and_seconds_are_short() {
+    fn errors_and_times_are_short() {
         let said = [0.5, 0.0123, 0.003, 1.2e-5, 1e-7, 0.0].map(percent);
         assert_eq!(said, ["50 %", "1.2 %", "0.30 %", "0.0012 %", "1e-5 %", "0 %"]);
         let said = [0.0005, 0.05, 0.9, 12.3, 130.0, 7200.0].map(seconds);
@@ -271,14 +273,14 @@ mod tests {
     }
 
     #[test]
-    fn says_everything() {
+    fn the_report_is_complete() {
         let text = markdown(&list());
         for part in [
             "5.0 % costs 0.20 s, 1.0 % costs 1.00 s, 0.10 % costs 8.00 s",
             "uncertain by 0.010 %",
             "observed rate 2.00",
             "limited by",
-            "Nobody should buy",
+            "Dominated settings",
             "1.0 % for 1.00 s: base",
             "runs shortened",
             "noise of 3 equal runs",

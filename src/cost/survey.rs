@@ -1,4 +1,4 @@
-//! Making a price list: what is run, in which order, and when it is enough.
+//! Makes a cost table: chooses which runs are made, in which order, and when to stop.
 
 use super::CostError;
 use super::coarse::Coarse;
@@ -16,32 +16,34 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Seconds of processor and of the clock, run by run.
+/// CPU and wall-clock time of each run, s.
 type Times = Vec<[f64; 2]>;
 
-/// How much is measured.
+/// Amount of measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// Under two minutes: runs are shortened, combinations few.
+    /// Takes less than two minutes: runs are shortened and few combinations are run.
     Quick,
-    /// Whole runs where one takes less than half a minute.
+    /// Runs are not shortened where one takes less than half a minute.
     Full,
 }
 
-/// Numbers that belong to an effort.
+/// Limits of an [`Effort`].
 struct Limits {
-    /// Seconds of the processor that a run with the scene's own settings may take: longer runs
-    /// are shortened. The whole list takes about forty of them.
+    /// Longest CPU time of a run with the scene's own settings, s. Longer runs are shortened. The
+    /// whole table takes about forty times as long.
     base: f64,
-    /// Seconds of the wall after which nothing new is started.
+    /// Wall-clock time after which no new run is started, s.
     total: f64,
-    /// Between the rungs of the ladder of references.
+    /// Refinement ratio between the resolutions of the reference.
     ratio: f64,
-    /// Of the cells, relative to the scene's own; all coarser than the finest rung.
+    /// Numbers of cells relative to that of the scene; all coarser than the reference.
     factors: &'static [f64],
-    /// The same where the solution is exact and no reference has to be finer.
+    /// The same as `factors`, for scenes with an exact solution, which need no finer reference.
     factors_exact: &'static [f64],
+    /// Largest number of combinations run in a round.
     combinations: usize,
+    /// Number of rounds of combinations.
     rounds: usize,
 }
 
@@ -70,32 +72,33 @@ impl Effort {
     }
 }
 
-/// Repeats of runs that take less than these seconds: short ones are noisier and cost nothing.
+/// CPU times, s, and how often shorter runs are repeated: short runs are noisier and cheap.
 const REPEATS: [(f64, usize); 3] = [(0.1, 5), (0.4, 3), (1.0, 2)];
 
-/// Seeds whose spread is the sampling error.
+/// Random seeds whose spread is the sampling error.
 const SEEDS: [u64; 3] = [11, 12, 13];
 
-/// Runs that take less than this many times a base are shortened less.
+/// Runs that take less than this multiple of [`Limits::base`] are shortened less.
 const LONG: f64 = 20.0;
 
-/// Fewest steps of a shortened run.
+/// Smallest number of steps of a shortened run.
 const LEAST_STEPS: f64 = 6.0;
 
-/// Share of the time that may be spent on coarse runs to the end.
+/// Share of the total time that may be spent on coarse runs to the end of the scene.
 const COARSE_SHARE: f64 = 0.25;
 
-/// Errors below this are rounding.
+/// Relative errors below this value are rounding errors.
 pub(super) const ROUNDING: f64 = 1e-12;
 
-/// A candidate that ran.
+/// A candidate that was run.
 struct Ran {
+    /// Index of the level of each knob.
     settings: Vec<usize>,
     sample: Sample,
     repeats: usize,
 }
 
-/// Everything at hand while a list is made.
+/// State of a survey: everything needed while a table is made.
 struct Survey<'a> {
     source: SceneSource,
     target: Target,
@@ -106,22 +109,23 @@ struct Survey<'a> {
     ran: Vec<Ran>,
     failed: Vec<String>,
     skipped: Vec<String>,
-    /// From the horizon to the scene's end.
+    /// Growth of the error from the horizon to the end of the scene.
     growth: Option<Growth>,
 }
 
-/// Plans a source with sets.
+/// Plans a scene source with `--set` assignments applied.
 pub(super) fn planned(source: &SceneSource, sets: &[String]) -> Result<Arc<Plan>, CostError> {
     let source = source.with_sets(sets)?;
     Ok(Arc::new(resolve(&parse(&source)?).map_err(|e| e.with_source(&source))?))
 }
 
-/// Sets that end a scene at a share of its time, frames keeping their interval.
+/// `--set` assignments that end a scene at a share of its time, and that end time in seconds.
+/// Frames keep their interval.
 fn shortened(scene: &Scene, share: f64) -> Result<(Vec<String>, f64), CostError> {
     let end = scene.time.end.eval(&Scope::new(scene)?)?;
     let frames = f64::from(scene.recording.frames);
     let kept = (frames * share).ceil().max(1.0);
-    // A whole number of intervals, so that frames stop the steps as they do in the scene.
+    // A whole number of frame intervals, so that steps end at frame times as in the scene.
     let share = if frames > 1.0 { (kept / frames).min(1.0) } else { share };
     if share >= 1.0 {
         return Ok((vec![], end));
@@ -134,7 +138,7 @@ fn shortened(scene: &Scene, share: f64) -> Result<(Vec<String>, f64), CostError>
     Ok((sets, end * share))
 }
 
-/// Makes the price list of a scene. `say` hears what is going on.
+/// Makes the cost table of a scene. `say` receives progress messages.
 pub fn price(
     source: &SceneSource,
     effort: Effort,
@@ -155,7 +159,7 @@ pub fn price(
     };
     let whole_seconds = coarse.as_ref().map_or(1.0, |c| c.forecast) * pilot.whole();
     if whole_seconds < LONG * limits.base {
-        // What coarse runs to the end take of longer ones is left for longer horizons.
+        // No coarse runs to the end are needed; their time is used for a longer horizon.
         limits.base *= 2.0;
     }
     let mut horizon = full;
@@ -163,7 +167,7 @@ pub fn price(
     let mut cuts = vec![];
     if target.at != Moment::Start && whole_seconds > limits.base {
         let share = (limits.base - pilot.start) / (whole_seconds - pilot.start);
-        // Fewer steps are all start.
+        // With fewer steps the start would dominate the time.
         let least = LEAST_STEPS / pilot.steps.max(LEAST_STEPS);
         let (sets, end) = shortened(&scene, share.max(least))?;
         short = source.with_sets(&sets)?;
@@ -174,7 +178,7 @@ pub fn price(
     let factors = if exact.is_some() { limits.factors_exact } else { limits.factors };
     let design = Design::new(&scene, &plan, target.at, factors)?;
     say(&format!(
-        "{}: {}; {} knobs; a whole run takes about {:.1} s of processor",
+        "{}: {}; {} knobs; a whole run takes about {:.1} s of CPU time",
         scene.name,
         target.title(),
         design.knobs.len(),
@@ -208,7 +212,7 @@ pub fn price(
         None => survey.ladder(&scene, &base, &mut gauges)?,
     };
     let (sampling, gauge_sampling) = survey.sampling(&scene, &plan, &reference)?;
-    // Combinations are what is sold: single knobs leave them time.
+    // Runs that vary a single knob leave time for combinations, which are the main result.
     let total = survey.limits.total;
     survey.limits.total = 0.75 * total;
     survey.one_by_one()?;
@@ -268,7 +272,7 @@ impl Survey<'_> {
         self.clock.elapsed().as_secs_f64()
     }
 
-    /// Runs once; a failure of the run is a finding, one of the scene is not.
+    /// Runs once. A failed run is recorded and gives `None`; an invalid scene is an error.
     fn sample(&mut self, label: &str, sets: &[String]) -> Result<Option<Sample>, CostError> {
         let plan = planned(&self.source, sets)?;
         match run(plan, &self.target, |_, _| {}) {
@@ -281,7 +285,8 @@ impl Survey<'_> {
         }
     }
 
-    /// Runs as often as it pays, keeps the best, and gives all that was taken.
+    /// Runs at least `least` times, and more often if runs are short. Returns the fastest run and
+    /// the times of all runs.
     fn best_of(
         &mut self,
         label: &str,
@@ -301,14 +306,14 @@ impl Survey<'_> {
             }
         }
         (self.say)(&format!(
-            "  {label}: {:.3} s of processor, best of {}",
+            "  {label}: {:.3} s of CPU time, best of {}",
             best.took.cpu,
             took.len()
         ));
         Ok(Some((best, took)))
     }
 
-    /// The scene's own settings, often enough to see the machine's noise.
+    /// Runs the scene's own settings often enough to measure the timing noise of the machine.
     fn base(&mut self) -> Result<Noise, CostError> {
         let settings = self.design.base();
         let label = self.design.label(&settings);
@@ -330,8 +335,8 @@ impl Survey<'_> {
         Ok(noise)
     }
 
-    /// What shortening leaves out, by coarse runs: how errors grow, and how many times longer whole
-    /// runs take.
+    /// Growth of the error between the horizon and the end of the scene, and the ratio of the times
+    /// of whole and shortened runs, both from coarse runs.
     fn beyond(&mut self, coarse: &Coarse) -> Result<Option<(Growth, f64)>, CostError> {
         let mut near = vec![];
         for n in coarse.cells {
@@ -341,7 +346,8 @@ impl Survey<'_> {
         Ok(Some(coarse.beyond([rough, fine], &self.target)))
     }
 
-    /// The reference where nothing is exact: a coarser and a finer rung beside the scene's own.
+    /// Computes a reference without an exact solution, from a coarser and a finer resolution beside
+    /// the scene's own.
     fn ladder(
         &mut self,
         scene: &Scene,
@@ -350,14 +356,14 @@ impl Survey<'_> {
     ) -> Result<Reference, CostError> {
         let ratio = self.limits.ratio;
         let mut rungs = vec![];
-        for (label, ratio) in [("coarse rung", 1.0 / ratio), ("reference", ratio)] {
+        for (label, ratio) in [("coarse resolution", 1.0 / ratio), ("reference", ratio)] {
             let sets = rung(scene, ratio, self.target.at)?;
             (self.say)(&format!("  {label}: {}", sets.join(" ")));
             let Some(sample) = self.sample(label, &sets)? else {
                 let why = self.failed.join("; ");
-                return Err(CostError::Useless(format!("there is no reference: {why}")));
+                return Err(CostError::Useless(format!("the reference cannot be computed: {why}")));
             };
-            (self.say)(&format!("  {label}: {:.3} s of processor", sample.took.cpu));
+            (self.say)(&format!("  {label}: {:.3} s of CPU time", sample.took.cpu));
             rungs.push(sample);
         }
         let counter = Target { quantity: Interesting::MaxSpeed, ..self.target.clone() };
@@ -369,7 +375,8 @@ impl Survey<'_> {
         Ok(Reference::ladder(values, ratio, &self.target))
     }
 
-    /// Whether there is time for a run of these seconds; notes what is left out.
+    /// True if there is time for a run of `seconds` of wall-clock time; records runs that are left
+    /// out.
     fn allows(&mut self, label: &str, seconds: f64) -> bool {
         let fits = self.elapsed() + seconds < self.limits.total;
         if !fits {
@@ -378,6 +385,8 @@ impl Survey<'_> {
         fits
     }
 
+    /// Runs a candidate unless it has been run or would take too long. `guess` is its expected
+    /// wall-clock time, s.
     fn candidate(&mut self, settings: Vec<usize>, guess: f64) -> Result<(), CostError> {
         if self.ran.iter().any(|r| r.settings == settings) {
             return Ok(());
@@ -393,13 +402,15 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// Every knob around the scene's own settings: those with sizes, cheap ones first, then choices.
+    /// Varies each knob alone around the scene's own settings: first knobs with sizes, from the
+    /// cheapest, then choices.
     fn one_by_one(&mut self) -> Result<(), CostError> {
         let base = self.ran[0].sample.took.wall;
         let mut list = vec![];
         for (k, knob) in self.design.knobs.iter().enumerate() {
             for (l, level) in knob.levels.iter().enumerate() {
-                // Cells count to the power two, and once more for the steps.
+                // The time grows with the square of the cells per side, and with the number of
+                // steps.
                 let guess = base * level.size.map_or(1.5, |h| h.powf(-2.5).clamp(0.1, 30.0));
                 list.push((self.design.one(k, l), guess, level.size.is_none()));
             }
@@ -408,8 +419,8 @@ impl Survey<'_> {
         list.into_iter().try_for_each(|(settings, guess, _)| self.candidate(settings, guess))
     }
 
-    /// Spread over other placements of particles and other random directors, relative; of the
-    /// quantity and of each gauge.
+    /// Relative standard deviation over other particle placements and random directors, of the
+    /// quantity and of each gauge. `None` if there was no time for two runs.
     fn sampling(
         &mut self,
         scene: &Scene,
@@ -420,7 +431,7 @@ impl Survey<'_> {
         if plan.state.materials.len() < 2
             && !(e.directors || e.carried_viscosity || e.carried_density)
         {
-            // All particles are alike: where they are makes no difference.
+            // All particles are identical, so their positions make no difference.
             return Ok((Some(0.0), vec![]));
         }
         let mut found: Vec<Sample> = vec![];
@@ -459,16 +470,18 @@ impl Survey<'_> {
         Ok((Some(all), gauges))
     }
 
+    /// The result of a candidate, if it was run.
     fn ran(&self, settings: &[usize]) -> Option<&Sample> {
         self.ran.iter().find(|r| r.settings == settings).map(|r| &r.sample)
     }
 
+    /// Relative error of a run against the reference.
     fn error(&self, sample: &Sample, reference: &Reference) -> f64 {
         let error = self.target.distance(&sample.value, &reference.value, reference.scale);
         if error < ROUNDING { 0.0 } else { error }
     }
 
-    /// What each setting of a knob adds to the error, and the power that says so.
+    /// Error that each level of a knob adds, and the power law fitted to it.
     fn adds(&self, knob: usize, reference: &Reference) -> (Vec<Option<f64>>, Option<Power>) {
         let k = &self.design.knobs[knob];
         let at = |l: usize| self.ran(&self.design.one(knob, l));
@@ -490,17 +503,17 @@ impl Survey<'_> {
             let adds = (0..k.levels.len())
                 .map(|l| {
                     let found = at(l)?;
-                    // What was measured counts more than the curve, which adds what the finest
-                    // setting still has.
+                    // The measured difference is used; the fit only adds the error of the finest
+                    // level.
                     let rest = power.map_or(0.0, |p| p.at(size(finest)));
                     Some(between(found, best) + rest)
                 })
                 .collect();
             return (adds, power);
         }
-        // A choice: the one whose error is least adds nothing.
+        // A choice: the level with the smallest error adds nothing.
         let best = match k.name {
-            // The scene's own is the finest of those tried.
+            // The scene's own tolerance is the smallest one tried.
             "tolerance" => Some(k.base),
             _ => measured.iter().copied().min_by(|&a, &b| {
                 let error = |l| at(l).map_or(f64::INFINITY, |s| self.error(s, reference));
@@ -512,11 +525,11 @@ impl Survey<'_> {
         (adds, None)
     }
 
-    /// Runs what the model of errors and times calls a front.
+    /// Runs combinations on the Pareto front of the model of errors and times.
     fn combine(&mut self, reference: &Reference) -> Result<(), CostError> {
         let base = self.ran[0].sample.took;
         let mut offers: Vec<Vec<Offer>> = vec![];
-        // Levels that ran: indices of the model differ from those of the design.
+        // Levels that were run: indices of the model differ from those of the design.
         let mut known: Vec<Vec<usize>> = vec![];
         for (k, knob) in self.design.knobs.iter().enumerate() {
             let (adds, _) = self.adds(k, reference);
@@ -548,7 +561,7 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// What each knob adds to the error of a candidate, largest first.
+    /// Contribution of each knob to the error of a candidate, largest first.
     fn split(&self, settings: &[usize], adds: &[Vec<Option<f64>>]) -> Vec<(String, f64)> {
         let mut split: Vec<(String, f64)> = (self.design.knobs.iter().enumerate())
             .map(|(k, knob)| (knob.name.to_string(), adds[k][settings[k]].unwrap_or(0.0)))
@@ -557,6 +570,7 @@ impl Survey<'_> {
         split
     }
 
+    /// Knobs, entries and Pareto front of the table.
     fn entries(
         &self,
         reference: &Reference,

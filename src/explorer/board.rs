@@ -1,32 +1,38 @@
-//! What pages read: the state as JSON, curves, saved files. Written by the session, read by the
-//! server at any time.
+//! This module holds the data that pages read: state as JSON, curves, a sketch and saved files. The
+//! session writes it, and the server can read it at any time.
 
 use crate::frame::{Frame, RunInfo};
 use crate::plan::Plan;
-use crate::sim::row::Row;
+use crate::sim::row::{Place, Row, places};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::watch;
 
-/// Numbers over time, a row per step.
+/// Diagnostics over time, with one point per step.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Curves {
+    /// Names of the columns.
     pub columns: Vec<String>,
+    /// Values of all columns at each step.
     pub points: Vec<Vec<f64>>,
 }
 
-/// A part of some curves.
+/// Part of the curves of a run.
 #[derive(Debug, Serialize)]
 pub struct Part {
+    /// Number of the run.
     pub run: u64,
+    /// Index of the first point.
     pub from: usize,
+    /// Names of the columns.
     pub columns: Vec<String>,
+    /// Values of all columns at each step from `from` on.
     pub points: Vec<Vec<f64>>,
 }
 
-/// See the module.
+/// Data shared between the session and the server.
 pub struct Board {
     state: watch::Sender<Arc<str>>,
     curves: Mutex<HashMap<u64, Curves>>,
@@ -34,22 +40,26 @@ pub struct Board {
     sketch: Mutex<Option<(RunInfo, Arc<Frame>)>>,
 }
 
-/// Most points of a sketch.
+/// Maximum number of particles in a sketch.
 const SKETCH_POINTS: usize = 20_000;
 
-/// A picture in few lines, for the time until the viewer is there.
+/// A simplified picture, shown until the viewer has loaded.
 #[derive(Debug, Serialize)]
 pub struct Sketch {
+    /// Number of the step.
     pub step: u64,
-    /// Lower left and upper right corner, m.
+    /// Lower left and upper right corner of the domain (m).
     pub domain: [[f32; 2]; 2],
+    /// Polylines of the walls (m).
     pub walls: Vec<Vec<[f32; 2]>>,
+    /// Polylines of the dye (m).
     pub dye: Vec<Vec<[f32; 2]>>,
-    /// Places of particles by material, with its colour.
+    /// Colour and particle positions (m) of each material.
     pub grains: Vec<([u8; 3], Vec<[f32; 2]>)>,
 }
 
 impl Board {
+    /// An empty board.
     pub fn new() -> Board {
         Board {
             state: watch::Sender::new("null".into()),
@@ -59,15 +69,17 @@ impl Board {
         }
     }
 
+    /// Publishes the state, as JSON.
     pub fn publish(&self, state: String) {
         self.state.send_replace(state.into());
     }
 
+    /// A receiver of the current state and its changes.
     pub fn watch(&self) -> watch::Receiver<Arc<str>> {
         self.state.subscribe()
     }
 
-    /// Points of a run from one on.
+    /// Points of a run from index `from` on; `None` if the run is unknown.
     pub fn part(&self, run: u64, from: usize) -> Option<Part> {
         let all = lock(&self.curves);
         let curves = all.get(&run)?;
@@ -76,17 +88,19 @@ impl Board {
         Some(Part { run, from, columns: curves.columns.clone(), points })
     }
 
+    /// Starts the curves of a run.
     pub fn begin(&self, run: u64, columns: Vec<String>) {
         lock(&self.curves).insert(run, Curves { columns, points: vec![] });
     }
 
+    /// Appends a point to the curves of a run.
     pub fn add(&self, run: u64, point: Vec<f64>) {
         if let Some(curves) = lock(&self.curves).get_mut(&run) {
             curves.points.push(point);
         }
     }
 
-    /// Keeps the curves of a run under another number.
+    /// Copies the curves of a run to the number `to`.
     pub fn copy(&self, run: u64, to: u64) {
         let mut all = lock(&self.curves);
         if let Some(curves) = all.get(&run).cloned() {
@@ -94,16 +108,17 @@ impl Board {
         }
     }
 
+    /// Removes the curves of a run.
     pub fn forget(&self, run: u64) {
         lock(&self.curves).remove(&run);
     }
 
-    /// Keeps the last picture to make a sketch of.
+    /// Keeps the last picture, from which the sketch is made.
     pub fn sketch(&self, info: &RunInfo, frame: Arc<Frame>) {
         *lock(&self.sketch) = Some((info.clone(), frame));
     }
 
-    /// A sketch of the last picture.
+    /// The sketch of the last picture; `None` if there is no picture.
     pub fn drawn(&self) -> Option<Sketch> {
         let (info, frame) = lock(&self.sketch).clone()?;
         let picture = frame.picture.as_ref()?;
@@ -125,11 +140,12 @@ impl Board {
         })
     }
 
-    /// Lets pages fetch a file under a folder's name and its own.
+    /// Makes a file available to pages, under a folder name and a file name.
     pub fn offer(&self, folder: &str, name: &str, path: PathBuf) {
         lock(&self.files).insert((folder.into(), name.into()), path);
     }
 
+    /// Path of a file that was made available.
     pub fn file(&self, folder: &str, name: &str) -> Option<PathBuf> {
         lock(&self.files).get(&(folder.to_string(), name.to_string())).cloned()
     }
@@ -139,34 +155,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Names of a plan's curves.
+/// Column names of the curves of a plan.
 pub fn columns(plan: &Plan) -> Vec<String> {
-    let mut list: Vec<String> =
-        ["step", "time", "dt", "power_error", "volume_error", "max_speed", "dissipation"]
-            .map(String::from)
-            .to_vec();
-    for g in &plan.gauges {
-        list.push(format!("{} volume", g.name));
-        list.push(format!("{} rate", g.name));
-    }
-    if plan.effects.directors {
-        list.push("mean |n_x|".into());
-    }
-    list
+    live(plan).map(|p| p.live_name).collect()
 }
 
-/// A point of each curve; a number that is not one becomes null.
-pub fn point(row: &Row) -> Vec<f64> {
-    let mut list = vec![
-        row.step as f64,
-        row.time,
-        row.dt,
-        row.power_error,
-        row.volume_error,
-        row.max_speed,
-        row.dissipation,
-    ];
-    list.extend(row.gauges.iter().flat_map(|g| [g.volume, g.rate]));
-    list.extend(row.alignment);
-    list
+/// Values of all columns at one step. JSON has null for values that are not finite.
+pub fn point(plan: &Plan, row: &Row) -> Vec<f64> {
+    live(plan).map(|p| p.number(row)).collect()
+}
+
+fn live(plan: &Plan) -> impl Iterator<Item = Place> {
+    places(plan).into_iter().filter(|p| p.column.live)
 }

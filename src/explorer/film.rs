@@ -1,22 +1,24 @@
-//! The frames of a run that are kept for showing it again.
+//! This module keeps the frames of a run, to show them again.
 
 use crate::frame::{Frame, Picture};
 use std::sync::Arc;
 
-/// Memory that the pictures of a run may take, bytes.
+/// Maximum memory of the pictures of a run (bytes).
 const BUDGET: usize = 192 << 20;
 
-/// Frames in order. All numbers are kept; where pictures would take too much memory, every second
-/// one of those that the scene did not ask for goes, and then of all.
+/// Frames in order. All scalars are kept. If the pictures exceed the memory limit, every second one
+/// of those not requested by the scene is removed, and then every second one of all.
 #[derive(Clone, Default)]
 pub struct Film {
     frames: Vec<Arc<Frame>>,
-    /// Which of them the scene asked for.
+    /// Whether the scene requested the picture of each frame.
     wanted: Vec<bool>,
+    /// Memory of the pictures (bytes, estimated).
     bytes: usize,
 }
 
 impl Film {
+    /// Appends a frame; `wanted` if the scene requested its picture.
     pub fn push(&mut self, frame: Arc<Frame>, wanted: bool) {
         self.bytes += size(&frame);
         self.frames.push(frame);
@@ -29,16 +31,17 @@ impl Film {
         }
     }
 
+    /// All frames in order.
     pub fn frames(&self) -> &[Arc<Frame>] {
         &self.frames
     }
 
-    /// Whether the last frame shows its instant.
+    /// Whether the last frame has a picture.
     pub fn ends_in_a_picture(&self) -> bool {
         self.frames.last().is_some_and(|f| f.picture.is_some())
     }
 
-    /// Takes every second picture out; the first and the last stay.
+    /// Removes every second picture, except the first and the last.
     fn thin(&mut self, wanted_too: bool) {
         let last = self.frames.len().saturating_sub(1);
         let mut out = true;
@@ -56,7 +59,7 @@ impl Film {
     }
 }
 
-/// Bytes of the picture, roughly.
+/// Approximate size of the picture of a frame (bytes).
 fn size(frame: &Frame) -> usize {
     let Some(p) = &frame.picture else { return 0 };
     let Picture { particles, dye_lines, glyphs, fields, arrows, isolines } = p;

@@ -1,4 +1,4 @@
-//! Writing a run into a folder: what `grainscope run` would have left.
+//! This module saves a run of the explorer in a folder with the files of `grainscope run`.
 
 use super::live::Live;
 use super::protocol::{Mode, SavedState};
@@ -11,25 +11,35 @@ use crate::record::summary::{Ending, Summary, Tally};
 use crate::scene::to_toml;
 use std::path::{Path, PathBuf};
 
-/// Longest name of a folder.
+/// Maximum length of a folder name (characters).
 const MAX_NAME: usize = 64;
 
-/// Why a run was not saved.
+/// Error of saving a run.
 #[derive(Debug, thiserror::Error)]
 pub enum KeepError {
-    #[error("{0:?} cannot name a folder: use 1 to 64 letters, digits, `_` and `-`")]
+    /// The name is not a valid folder name.
+    #[error("{0:?} is not a valid folder name: use 1 to 64 letters, digits, `_` and `-`")]
     Name(String),
+    /// The folder cannot be created.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// The recording cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// A plot cannot be written.
     #[error(transparent)]
     Plot(#[from] PlotError),
+    /// A file cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    Write {
+        /// Path of the file.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
 }
 
-/// Whether a name is one of a folder, and leads nowhere else.
+/// Checks that a name is a plain folder name, which cannot lead out of the parent folder.
 pub fn checked(name: &str) -> Result<&str, KeepError> {
     let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(ordinary) {
@@ -38,7 +48,7 @@ pub fn checked(name: &str) -> Result<&str, KeepError> {
     Ok(name)
 }
 
-/// Writes a run into a folder of its own below `out`; a taken name gets a number.
+/// Saves a run in a new folder below `out`. If the name is taken, a number is appended.
 pub fn keep(
     live: &Live,
     mode: Mode,
@@ -60,7 +70,7 @@ pub fn keep(
     let folder_name = folder.file_name().map(|n| n.to_string_lossy().into_owned());
     let mut info = live.info.clone();
     info.name = folder_name.clone().unwrap_or(info.name);
-    // The schedule has grown since the run began.
+    // The schedule has changed since the start of the run.
     info.scene_toml = to_toml(&live.plan.scene);
     let mut log = RerunLog::open(&info, &[Sink::Save(recording.clone())])?;
     live.film.frames().iter().try_for_each(|frame| log.frame(frame))?;
@@ -102,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_lead_nowhere_else() {
+    fn only_plain_folder_names_are_accepted() {
         for name in ["a", "silo-2", "my_run", "5"] {
             assert!(checked(name).is_ok(), "{name}");
         }

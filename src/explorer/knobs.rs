@@ -1,4 +1,5 @@
-//! What can be turned: parameters, gravity, effects, accuracy.
+//! This module lists the values that can be changed on the page: parameters, gravity, effects and
+//! accuracy.
 
 use super::draft::Draft;
 use crate::cost::{List, list};
@@ -7,53 +8,68 @@ use crate::scene::{Scene, Scope};
 use indexmap::IndexMap;
 use serde::Serialize;
 
-/// A number of the scene with what a slider needs to know.
+/// A number of the scene that can be set with a slider.
 #[derive(Clone, Debug, Serialize)]
 pub struct Knob {
+    /// Key in the scene.
     pub key: String,
+    /// Label on the page.
     pub label: String,
+    /// Unit; empty for pure numbers.
     pub unit: String,
+    /// Present value.
     pub value: f64,
+    /// Lower bound; `None` if there is none.
     pub min: Option<f64>,
+    /// Upper bound; `None` if there is none.
     pub max: Option<f64>,
+    /// Default value of the scene.
     pub default: f64,
-    /// What a small change of it would restart the run for; `None` takes effect at once.
+    /// Part of the plan for which a small change restarts the run; `None` if it takes effect at
+    /// once.
     pub restarts: Option<&'static str>,
 }
 
-/// An effect that is there or not as a parameter is zero or not.
+/// An effect that is solved unless a parameter is zero.
 #[derive(Clone, Debug)]
 pub struct Switch {
+    /// Name of the effect.
     pub effect: &'static str,
+    /// Key of the parameter.
     pub key: String,
+    /// Whether the effect is solved.
     pub on: bool,
-    /// Value that turns it over.
+    /// Value of the parameter that switches the effect.
     pub other: String,
-    /// Unknowns with and without.
+    /// Number of unknowns with and without the effect.
     pub unknowns: [usize; 2],
-    /// What is computed with and without.
+    /// Identifier of the computation with and without the effect, see [`kind`].
     pub kinds: [String; 2],
 }
 
-/// A stop of the accuracy dial.
+/// A position of the accuracy dial.
 #[derive(Clone, Debug)]
 pub struct Stop {
+    /// Value of `accuracy.cells`.
     pub cells: u32,
+    /// Number of unknowns.
     pub unknowns: usize,
+    /// Identifier of the computation, see [`kind`].
     pub kind: String,
+    /// Relative error from the cost table; `None` if there is none.
     pub error: Option<f64>,
 }
 
-/// The key of the accuracy dial.
+/// Key that the accuracy dial sets.
 pub const CELLS: &str = "accuracy.cells";
 
-/// Cells of the dial over those of the scene's file, in twelfths.
+/// Number of cells of each dial position relative to that of the scene file, in twelfths.
 const DIAL: [u32; 7] = [4, 6, 8, 12, 16, 24, 36];
 
-/// Meshes beyond this are not offered by the dial: a step would take minutes.
+/// Largest mesh of the dial (unknowns): with a larger one, a step would take minutes.
 const MOST_UNKNOWNS: usize = 1_000_000;
 
-/// Everything that can be turned in a scene whose knobs stand as `draft` says, which is `plan`.
+/// Values that can be changed in the scene of `draft`, whose plan is `plan`.
 pub fn knobs(draft: &Draft, plan: &Plan) -> Vec<Knob> {
     let scene = &plan.scene;
     let Ok(scope) = Scope::new(scene) else { return vec![] };
@@ -79,7 +95,7 @@ pub fn knobs(draft: &Draft, plan: &Plan) -> Vec<Knob> {
         })
         .collect();
     for (c, name) in ["x", "y"].into_iter().enumerate() {
-        // A direction that does not pull and does not depend on anything is left out.
+        // A zero component of gravity is left out.
         let Ok(value) = scene.gravity[c].eval(&scope) else { continue };
         if value != 0.0 {
             list.push(Knob {
@@ -103,7 +119,7 @@ pub fn knobs(draft: &Draft, plan: &Plan) -> Vec<Knob> {
     list
 }
 
-/// The values of knobs after one of them was turned.
+/// Updates the values of the knobs after one of them has changed.
 pub fn refresh(knobs: &mut [Knob], plan: &Plan) {
     let Ok(scope) = Scope::new(&plan.scene) else { return };
     for knob in knobs {
@@ -116,7 +132,7 @@ pub fn refresh(knobs: &mut [Knob], plan: &Plan) {
     }
 }
 
-/// A value close to a knob's own, within its range and on the same side of zero.
+/// A value close to the present one, within the range and with the same sign.
 fn nearby(knob: &Knob) -> Option<f64> {
     let v = knob.value;
     let step = if v == 0.0 { knob.default.abs().max(1.0) } else { v };
@@ -125,7 +141,8 @@ fn nearby(knob: &Knob) -> Option<f64> {
     [v + 1e-2 * step, v - 1e-2 * step].into_iter().find(|&x| inside(x))
 }
 
-/// Effects that a knob at zero leaves out.
+/// Effects that can be switched off by setting a knob to zero. `last` has the last value of each
+/// knob that was not zero.
 pub fn switches(
     draft: &Draft,
     plan: &Plan,
@@ -153,7 +170,7 @@ pub fn switches(
         };
         let (with, without) = if on { (plan, &changed) } else { (&changed, plan) };
         let Some(effect) = one_more(&with.effects, &without.effects) else { continue };
-        // Several knobs at zero may do the same; the first one is enough.
+        // If several knobs switch the same effect, only the first one is listed.
         if list.iter().all(|s| s.effect != effect) {
             list.push(Switch {
                 effect,
@@ -168,7 +185,7 @@ pub fn switches(
     list
 }
 
-/// The effect that one set has and the other lacks.
+/// The effect in `with` that is not in `without`.
 fn one_more(with: &EffectSet, without: &EffectSet) -> Option<&'static str> {
     [
         (with.rotation, without.rotation, "Cosserat rotation"),
@@ -180,12 +197,13 @@ fn one_more(with: &EffectSet, without: &EffectSet) -> Option<&'static str> {
     .find_map(|(a, b, name)| (a && !b).then_some(name))
 }
 
-/// Velocity, rotation and pressure.
+/// Number of velocity, rotation and pressure unknowns.
 pub fn unknowns(plan: &Plan) -> usize {
     plan.unknowns_per_node() * plan.mesh.nodes() + 3 * plan.mesh.cells()
 }
 
-/// The accuracy dial, coarse to fine, around the cells that the scene's file asks for.
+/// Positions of the accuracy dial, from coarse to fine, around `own`, the number of cells in the
+/// scene file.
 pub fn dial(draft: &Draft, plan: &Plan, own: u32) -> Vec<Stop> {
     let mut cells: Vec<u32> = DIAL.iter().map(|k| (own * k).div_ceil(12).max(1)).collect();
     cells.push(plan.scene.accuracy.cells);
@@ -213,14 +231,14 @@ pub fn dial(draft: &Draft, plan: &Plan, own: u32) -> Vec<Stop> {
         .collect()
 }
 
-/// The price list that `grainscope cost` has made of a scene with its own number of cells.
+/// The cost table that `grainscope cost` has made for a scene with its own number of cells.
 fn price_list(scene: &Scene, own: u32) -> Option<List> {
     let mut scene = scene.clone();
     scene.accuracy.cells = own;
     list::kept(&scene, false).or_else(|| list::kept(&scene, true))
 }
 
-/// What a list promises of a number of cells, other settings as near to the scene's as there are.
+/// Error that a cost table states for a number of cells, with the fewest other settings.
 fn price(list: &List, cells: u32, own: u32) -> Option<f64> {
     let of = |sets: &[String]| {
         let set = sets.iter().find_map(|s| s.strip_prefix(CELLS)?.strip_prefix('='));
@@ -230,7 +248,7 @@ fn price(list: &List, cells: u32, own: u32) -> Option<f64> {
     same.min_by_key(|e| e.sets.len()).map(|e| e.promised)
 }
 
-/// Identity of what is computed, for remembering what a step of it took.
+/// Identifier of a computation, under which the time of a step is remembered.
 pub fn kind(plan: &Plan) -> String {
     format!("{} {} {:?}", plan.scene.name, unknowns(plan), plan.effects)
 }
@@ -247,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn knobs_say_what_they_would_restart() {
+    fn knobs_state_why_a_change_restarts_the_run() {
         let (draft, plan) = silo();
         let knobs = knobs(&draft, &plan);
         let of = |key: &str| knobs.iter().find(|k| k.key == key).expect("a knob");
@@ -255,12 +273,12 @@ mod tests {
         assert_eq!(of("contrast").restarts, None);
         assert_eq!(of("gravity[1]").restarts, None);
         assert_eq!(of("aperture").restarts, Some("the mesh"));
-        assert_eq!(of("fill_height").restarts, Some("what fills the domain at first"));
+        assert_eq!(of("fill_height").restarts, Some("the initial regions"));
         assert_eq!((of("alpha").min, of("alpha").max), (Some(0.0), Some(100.0)));
     }
 
     #[test]
-    fn zeros_switch_effects() {
+    fn zero_parameters_switch_effects_off() {
         let (draft, plan) = silo();
         let knobs = knobs(&draft, &plan);
         let list = switches(&draft, &plan, &knobs, &IndexMap::new());

@@ -1,46 +1,52 @@
-//! Scenes that can be picked: presets, and the files of one folder.
+//! This module lists the scenes that a page can open: presets, and the files of one folder.
 
 use crate::scene::{self, SceneError, SceneSource, presets};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Most files that are offered.
+/// Maximum number of listed files.
 const MAX_FILES: usize = 200;
 
-/// A scene that can be picked.
+/// A scene that a page can open.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Entry {
-    /// Unique; what pages send back.
+    /// Unique id, which pages send in commands.
     pub id: String,
+    /// Name of the preset or the file.
     pub name: String,
+    /// Description of the scene.
     pub description: String,
+    /// Whether it is a preset.
     pub preset: bool,
 }
 
-/// Where scenes come from. Pages name entries of a list and never give paths.
+/// The list of scenes. Pages send ids of entries, never paths.
 pub struct Library {
     folder: PathBuf,
-    /// The scene of the command line, if it lies elsewhere.
+    /// The scene of the command line, if it is outside the folder.
     given: Option<PathBuf>,
     entries: Vec<Entry>,
 }
 
 impl Library {
+    /// The presets and the scenes in `folder`.
     pub fn new(folder: PathBuf) -> Library {
         let mut library = Library { folder, given: None, entries: vec![] };
         library.look();
         library
     }
 
+    /// Folder of the listed files.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
+    /// All entries of the list.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// Adds the scene of the command line, and says under which name.
+    /// Adds the scene of the command line; returns its id.
     pub fn give(&mut self, source: &SceneSource, from_file: bool) -> String {
         if !from_file {
             return preset_id(source.name());
@@ -61,7 +67,7 @@ impl Library {
         given_id(source.name())
     }
 
-    /// Looks through the folder again.
+    /// Reads the folder again.
     pub fn look(&mut self) {
         let presets = presets::list().into_iter().map(|(name, description)| Entry {
             id: preset_id(name),
@@ -71,7 +77,7 @@ impl Library {
         });
         let file = |id: String, path: &Path, name: String| {
             let source = scene::load(path).ok()?;
-            // Not every TOML file is a scene; a broken scene is to be seen.
+            // Not every TOML file is a scene. A scene with errors is listed too.
             let like_a_scene = ["schema", "[materials", "[domain"];
             if !like_a_scene.iter().any(|word| source.text().contains(word)) {
                 return None;
@@ -90,7 +96,7 @@ impl Library {
         self.entries = presets.chain(given).chain(inside).collect();
     }
 
-    /// The text of a scene, read anew.
+    /// Reads the text of a scene from its file.
     pub fn find(&self, id: &str) -> Result<SceneSource, SceneError> {
         let unknown = || {
             SceneError::new(
@@ -105,7 +111,7 @@ impl Library {
         {
             return scene::load(path);
         }
-        // Only what the folder itself lists: no name reaches outside of it.
+        // The name must be one listed in the folder, so no file outside can be read.
         let name = files(&self.folder).into_iter().find(|name| file_id(name) == id);
         let name = name.ok_or_else(unknown)?;
         // Messages name the file as the user would.
@@ -124,7 +130,7 @@ fn given_id(path: &str) -> String {
     format!("given:{path}")
 }
 
-/// Names of the TOML files of a folder; links that lead out of it do not count.
+/// Names of the TOML files of a folder, without links to files outside.
 fn files(folder: &Path) -> Vec<String> {
     let Ok(home) = folder.canonicalize() else { return vec![] };
     let Ok(found) = std::fs::read_dir(folder) else { return vec![] };
@@ -147,7 +153,7 @@ mod tests {
     use crate::testing::TempFolder;
 
     #[test]
-    fn no_name_leaves_the_folder() {
+    fn no_id_gives_access_outside_the_folder() {
         let folder = TempFolder::new().expect("a folder");
         let inside = folder.path().join("inside");
         std::fs::create_dir(&inside).expect("a folder");

@@ -1,4 +1,4 @@
-//! A run with all that was seen of it.
+//! This module holds the run of the explorer with its frames, rows and changes.
 
 use super::board::{self, Board};
 use super::draft::{Draft, quantity};
@@ -10,54 +10,64 @@ use crate::record::info;
 use crate::record::summary::Tally;
 use crate::scene::SceneError;
 use crate::sim::guard::{Guard, Policy};
-use crate::sim::row::{Phases, Row};
+use crate::sim::phases::Phases;
+use crate::sim::row::Row;
 use crate::sim::{self, Run, SimError, picture};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Pictures come no closer together than this while running.
+/// Minimum interval of pictures while running.
 const PICTURE_EVERY: Duration = Duration::from_millis(150);
-/// Drawing takes at most this share of the time.
+/// Maximum fraction of the time that is spent on drawing.
 const PICTURE_SHARE: f64 = 0.2;
-/// Steps that means are taken over.
+/// Number of steps for means.
 const MEAN_OVER: usize = 20;
 
-/// What turning a knob would do.
+/// Effect of changing a value.
 pub enum Turn {
-    /// It takes effect with a step to come, by this plan.
+    /// It takes effect in the run, with this plan and from this step on.
     Live(Box<Plan>, u64),
-    /// It needs a run of its own, because of this.
+    /// It needs a new run, for this reason.
     Restart(String),
 }
 
-/// See the module.
+/// The run of the explorer with its data.
 pub struct Live {
+    /// Number of the run.
     pub id: u64,
+    /// Scene and values set on the page.
     pub draft: Draft,
-    /// Of the draft: what a new run would be.
+    /// Plan of the draft, which a new run would have.
     pub values: Plan,
+    /// The run.
     pub run: Box<dyn Run>,
     guard: Guard,
-    /// What the guard had to note about the last step.
+    /// Messages of the guard about the last step.
     faults: Vec<String>,
+    /// Plan of the run, with all changes so far.
     pub plan: Arc<Plan>,
+    /// Constant part of its recording.
     pub info: RunInfo,
+    /// Its frames.
     pub film: Film,
+    /// Its diagnostics, one row per step.
     pub rows: Vec<Row>,
+    /// Totals for the summary.
     pub tally: Tally,
+    /// Changes of the scene during the run.
     pub changes: Vec<Change>,
     frames: usize,
-    /// Spent on steps so far.
+    /// Computing time of all steps so far.
     computing: Duration,
     drawn: Option<Instant>,
     drawing: Duration,
-    /// Ends of the last steps.
+    /// End times of the last steps.
     ends: VecDeque<Instant>,
 }
 
 impl Live {
-    /// Solves the first instant.
+    /// Starts a run and solves its first instant.
     pub fn start(id: u64, draft: Draft, plan: Plan, board: &Board) -> Result<Live, SimError> {
         let plan = Arc::new(plan);
         let clock = Instant::now();
@@ -91,7 +101,7 @@ impl Live {
         })
     }
 
-    /// Takes a step. What happened in it is in the events of the run.
+    /// Takes a step. Its events are in the events of the run.
     pub fn step(&mut self) -> Result<(), SimError> {
         let clock = Instant::now();
         self.faults = self.guard.step(self.run.as_mut())?;
@@ -104,7 +114,7 @@ impl Live {
         for change in self.changes.iter_mut().filter(|c| c.step == step) {
             change.time = Some(time);
         }
-        // Those of the scene's own schedule are told when they happen.
+        // Changes of the scene's own schedule are listed when they happen.
         for event in self.run.events() {
             let label = event.split_once(": ").map_or(event.as_str(), |e| e.1).to_string();
             if !self.changes.iter().any(|c| c.step == step) {
@@ -114,8 +124,7 @@ impl Live {
         Ok(())
     }
 
-    /// Writes the present instant down; `draw` wants a picture of it however short ago the last
-    /// one was.
+    /// Records the present instant. `draw` requests a picture, however recent the last one is.
     pub fn observe(&mut self, draw: bool, board: &Board) -> Arc<Frame> {
         let row = self.run.row().clone();
         self.tally.add(&row);
@@ -130,12 +139,12 @@ impl Live {
         let wall = self.computing.as_secs_f64();
         let frame = Arc::new(info::frame(&self.plan, &row, wall, picture, notes));
         self.film.push(frame.clone(), wanted);
-        board.add(self.id, board::point(&row));
+        board.add(self.id, board::point(&self.plan, &row));
         self.rows.push(row);
         frame
     }
 
-    /// A picture of the present instant, if the last frame has none.
+    /// Adds a picture of the present instant, unless the last frame has one.
     pub fn look(&mut self) -> Option<Arc<Frame>> {
         if self.film.ends_in_a_picture() {
             return None;
@@ -163,7 +172,7 @@ impl Live {
         self.drawn.is_none_or(|last| last.elapsed() >= pause)
     }
 
-    /// What turning a knob would do, and the draft with it turned.
+    /// The draft with `key` set to `value`, its plan, and the effect of the change.
     pub fn turn(&self, key: &str, value: &str) -> Result<(Draft, Plan, Turn), SceneError> {
         let draft = self.draft.with(key, value)?;
         let values = draft.plan()?;
@@ -179,7 +188,7 @@ impl Live {
         Ok((draft, values, turn))
     }
 
-    /// Goes on by another plan, made by [`Live::turn`].
+    /// Continues with another plan, made by [`Live::turn`].
     pub fn go_on(&mut self, draft: Draft, values: Plan, plan: Plan, step: u64) {
         self.draft = draft;
         self.values = values;
@@ -191,37 +200,39 @@ impl Live {
         self.changes.push(Change { step, time: None, label });
     }
 
-    /// Standing still does not count as slow.
+    /// Restarts the measurement of the rate: a pause does not count as slow.
     pub fn paused(&mut self) {
         self.ends.clear();
     }
 
+    /// Steps per second over the last steps; `None` if unknown.
     pub fn steps_per_second(&self) -> Option<f64> {
         let (first, last) = (self.ends.front()?, self.ends.back()?);
         let span = last.duration_since(*first).as_secs_f64();
         (self.ends.len() > 1 && span > 0.0).then(|| (self.ends.len() - 1) as f64 / span)
     }
 
-    /// The last steps; row 0 sets everything up and counts only while it is alone.
+    /// The last rows. Row 0 includes the set-up and is used only if it is the only one.
     fn last(&self) -> &[Row] {
         let from = self.rows.len().saturating_sub(MEAN_OVER).max(1);
         self.rows.get(from..).filter(|r| !r.is_empty()).unwrap_or(&self.rows)
     }
 
-    /// Seconds by phase of the last steps, all together.
+    /// Seconds by phase, summed over the last steps.
     pub fn phases(&self) -> Phases {
         let mut sum = Phases::default();
         self.last().iter().for_each(|r| sum.add(&r.seconds));
         sum
     }
 
-    /// Seconds that a step takes: the median of the last ones.
+    /// Median computing time of the last steps (s).
     pub fn usual_step(&self) -> f64 {
         let mut walls: Vec<f64> = self.last().iter().map(|r| r.wall).collect();
         walls.sort_by(f64::total_cmp);
         walls.get(walls.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
+    /// Computing time of all steps so far (s).
     pub fn seconds(&self) -> f64 {
         self.computing.as_secs_f64()
     }

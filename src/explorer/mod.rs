@@ -1,4 +1,5 @@
-//! The explorer: a run that listens, and a page that shows it.
+//! This module implements the explorer: an interactive run, and a web page that shows and controls
+//! it.
 //!
 //! ```text
 //! page --- commands ---> server --- channel ---> session: takes a step, answers, takes a step
@@ -6,10 +7,10 @@
 //!  |<-------- state -------+<------- board ---------+            +--> viewer (recording)
 //! ```
 //!
-//! The `session` owns the run and everything that can be said of it, on a thread of its own. It
-//! takes commands between steps and answers each one: accepted, with what it does, or refused, and
-//! why. What it knows is written on the `board`, which the `server` reads whenever a page asks,
-//! however long a step takes. Pages hold no state: all that are open show the same session.
+//! The `session` owns the run and its data, on a thread of its own. It takes commands between steps
+//! and answers each one: accepted, with the effect, or refused, with the reason. It publishes its
+//! state on the `board`, which the `server` can read at any time, however long a step takes. Pages
+//! hold no state: all open pages show the same session.
 
 mod board;
 mod draft;
@@ -36,44 +37,54 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
 
-/// Commands that may wait for the session.
+/// Number of commands that may wait for the session.
 const WAITING: usize = 64;
 
-/// What the explorer opens with.
+/// Settings of an explorer.
 pub struct Settings {
-    /// The first scene, and whether it is a preset or a file.
+    /// The first scene.
     pub scene: SceneSource,
+    /// Whether the scene is a file; otherwise it is a preset.
     pub from_file: bool,
-    /// Changes of the scene's text, as `--set` takes them.
+    /// Settings of the scene, in the form of `--set`.
     pub sets: Vec<String>,
-    /// Folder whose scenes are offered beside the presets.
+    /// Folder whose scenes are listed in addition to the presets.
     pub folder: PathBuf,
-    /// Folder that saved runs go to.
+    /// Folder for saved runs.
     pub out: PathBuf,
-    /// Port of the page; 0 takes any free one.
+    /// Port of the page; 0 takes any free port.
     pub port: u16,
-    /// Stand at the first instant until told to run.
+    /// Whether the run is paused at the first instant.
     pub paused: bool,
     /// Ends the session when set.
     pub interrupted: Arc<AtomicBool>,
 }
 
-/// Why there is no explorer.
+/// Error of starting an explorer.
 #[derive(Debug, thiserror::Error)]
 pub enum ExplorerError {
+    /// The port cannot be used.
     #[error("port {port} of this machine cannot be used: {source}; 0 takes any free port")]
-    Port { port: u16, source: std::io::Error },
-    #[error("the system gives no random numbers, which the page's address needs: {0}")]
+    Port {
+        /// The requested port.
+        port: u16,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// There are no random numbers for the address of the page.
+    #[error("the system provides no random numbers, which the address of the page needs: {0}")]
     Random(getrandom::Error),
+    /// A thread cannot be started.
     #[error("a thread cannot be started: {0}")]
     Thread(std::io::Error),
+    /// The program does not contain the files of the viewer.
     #[error("this program was built without the viewer's files")]
     NoViewer,
 }
 
-/// An explorer that is open.
+/// A running explorer.
 pub struct Explorer {
-    /// Where the page is; nobody else knows the token in it.
+    /// Address of the page, with a secret token.
     pub url: String,
     session: JoinHandle<()>,
 }
@@ -110,7 +121,7 @@ impl Explorer {
         Ok(Explorer { url, session })
     }
 
-    /// Waits until the session is told to end.
+    /// Waits until the session ends.
     pub fn wait(self) {
         if let Err(panic) = self.session.join() {
             std::panic::resume_unwind(panic);
@@ -118,7 +129,7 @@ impl Explorer {
     }
 }
 
-/// 128 random bits in hexadecimal digits.
+/// A token of 128 random bits as hexadecimal digits.
 fn token() -> Result<String, ExplorerError> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(ExplorerError::Random)?;

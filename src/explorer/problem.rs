@@ -1,33 +1,36 @@
-//! What is wrong with a scene or a run, as the page shows it.
+//! This module describes errors of scenes and runs for the page.
 
 use crate::scene::{SceneError, SceneSource};
 use crate::sim::SimError;
 use serde::Serialize;
 
-/// A fault with the lines it points at.
+/// An error shown on the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct Problem {
+    /// Heading.
     pub title: String,
+    /// The individual errors.
     pub faults: Vec<Fault>,
-    /// The scene of the library that it is about, to try it again.
+    /// Id of the scene in the library, with which the page can load it again.
     pub scene: Option<String>,
 }
 
-/// One thing that is wrong.
+/// One error.
 #[derive(Clone, Debug, Serialize)]
 pub struct Fault {
-    /// With file, line and column where they are known.
+    /// Message, with file, line and column where they are known.
     pub message: String,
+    /// What to do about the error.
     pub remedy: Option<String>,
-    /// Number and text of the line.
+    /// Number (from 1) and text of the line.
     pub line: Option<(usize, String)>,
 }
 
-/// Longest line that is shown.
+/// Maximum length of a shown line (characters).
 const MAX_LINE: usize = 200;
 
 impl Problem {
-    /// Of a scene that cannot be run.
+    /// The errors of a scene.
     pub fn of_scene(name: &str, error: &SceneError, source: &SceneSource) -> Problem {
         let error = error.clone().with_source(source);
         let all = std::iter::once(&error).chain(error.others());
@@ -39,25 +42,21 @@ impl Problem {
         Problem { title: format!("{name} cannot be run"), faults: faults.collect(), scene: None }
     }
 
-    /// Of a run that cannot start or go on.
+    /// The error of a run that cannot start or continue.
     pub fn of_run(error: &SimError) -> Problem {
         let fault =
             Fault { message: error.to_string(), remedy: Some(error.remedy().into()), line: None };
-        Problem { title: "The run cannot go on".into(), faults: vec![fault], scene: None }
+        Problem { title: "The run cannot continue".into(), faults: vec![fault], scene: None }
     }
 
-    /// Of anything else.
+    /// An error outside the run, such as a failed recording.
     pub fn of_machine(message: String) -> Problem {
         let fault = Fault { message, remedy: None, line: None };
-        Problem {
-            title: "Something outside of the run is in the way".into(),
-            faults: vec![fault],
-            scene: None,
-        }
+        Problem { title: "An error outside the run".into(), faults: vec![fault], scene: None }
     }
 }
 
-/// Number and text of the line that a byte lies in.
+/// Number (from 1) and text of the line that contains a byte.
 fn line_at(text: &str, byte: usize) -> Option<(usize, String)> {
     let before = text.get(..byte)?;
     let number = before.matches('\n').count();

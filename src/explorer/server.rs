@@ -1,8 +1,8 @@
-//! The page over HTTP, to this machine only.
+//! This module serves the page over HTTP, to this machine only.
 //!
-//! Every path starts with the token; requests must name this machine as host, and come from no
-//! other site. Pages name scenes and files from lists of the session, never paths. Bodies,
-//! headers and connections are limited.
+//! Every path starts with the token. The host of a request must be this machine, and its origin
+//! must not be another site. Pages choose scenes and files from lists of the session and never give
+//! paths. The sizes of bodies and headers and the number of connections are limited.
 
 use super::board::Board;
 use super::protocol::{Answer, Command};
@@ -24,15 +24,15 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{Semaphore, oneshot};
 
-/// Largest body of a command, bytes.
+/// Maximum size of the body of a command (bytes).
 const MAX_BODY: usize = 16 * 1024;
-/// Largest head of a request, bytes.
+/// Maximum size of the header of a request (bytes).
 const MAX_HEAD: usize = 32 * 1024;
-/// Connections at a time.
+/// Maximum number of concurrent connections.
 const MAX_CONNECTIONS: usize = 128;
-/// How long the head of a request may take, and its body.
+/// Time limit for the header of a request, and for its body.
 const CLIENT_PATIENCE: Duration = Duration::from_secs(10);
-/// How long a stream of states may be silent.
+/// Maximum silence of an event stream.
 const HEARTBEAT: Duration = Duration::from_secs(10);
 
 const PAGE: &str = include_str!("../../assets/explorer/index.html");
@@ -43,28 +43,32 @@ const VIEWER: &str = include_str!("../../assets/explorer/viewer.html");
 const VIEWER_SCRIPT: &str = include_str!("../../assets/explorer/viewer.js");
 const ICON: &str = include_str!("../../assets/explorer/icon.svg");
 
-/// What pages may load and do: nothing that is not from here, but for the recording's data.
+/// Content security policy: pages load only from this server, except the data of the recording.
 const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
     style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; \
     connect-src 'self' http://127.0.0.1:*; frame-src 'self'; worker-src 'self' blob:; \
     frame-ancestors 'self'; base-uri 'none'; form-action 'none'";
 
-/// What is served, and to whom.
+/// Configuration and data of the server.
 pub struct Site {
+    /// Port of the page.
     pub port: u16,
+    /// Secret token in the address of the page.
     pub token: String,
+    /// Sender of commands to the session.
     pub commands: Sender<Order>,
+    /// Data that the session publishes.
     pub board: Arc<Board>,
 }
 
 type Shared = State<Arc<Site>>;
 
-/// Serves until the program ends.
+/// Serves the page until the program ends.
 pub fn serve(listener: TcpListener, site: Site) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let outcome = runtime.and_then(|r| r.block_on(accept(listener, routes(Arc::new(site)))));
     if let Err(e) = outcome {
-        eprintln!("error: the page is not served any more: {e}");
+        eprintln!("error: the server of the page has stopped: {e}");
     }
 }
 
@@ -75,7 +79,7 @@ async fn accept(listener: TcpListener, routes: Router) -> std::io::Result<()> {
     loop {
         let place = places.clone().acquire_owned().await;
         let Ok((stream, _)) = listener.accept().await else {
-            // Too many open files, or a connection that was given up: others may still come.
+            // Too many open files, or an aborted connection: later connections may still succeed.
             tokio::time::sleep(Duration::from_millis(50)).await;
             continue;
         };
@@ -86,7 +90,7 @@ async fn accept(listener: TcpListener, routes: Router) -> std::io::Result<()> {
             .max_buf_size(MAX_HEAD)
             .serve_connection(TokioIo::new(stream), service);
         tokio::spawn(async move {
-            // A connection that breaks is its client's affair.
+            // A broken connection concerns only its client.
             let _ = serving.await;
             drop(place);
         });
@@ -125,7 +129,7 @@ fn routes(site: Arc<Site>) -> Router {
         .route("/api/sketch", get(sketch))
         .route("/api/command", post(command))
         .route("/api/saved/{folder}/{file}", get(saved));
-    // A router inside another does not match its own root with a slash at the end.
+    // A nested router does not match its own root with a trailing slash.
     let root = format!("/{}", site.token);
     let mut all = Router::new().route(&format!("{root}/"), text(HTML, PAGE));
     all = all.nest(&root, inside);
@@ -134,7 +138,7 @@ fn routes(site: Arc<Site>) -> Router {
         .with_state(site)
 }
 
-/// Refuses whoever is not a page of this program, and says to browsers what its pages may do.
+/// Refuses requests that are not from a page of this program, and adds the security headers.
 async fn guard(State(site): Shared, request: Request, next: Next) -> Response {
     let mut response = match admit(&site, &request) {
         Ok(()) => next.run(request).await,
@@ -159,11 +163,11 @@ fn admit(site: &Site, request: &Request) -> Result<(), &'static str> {
     let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", site.port));
     let text = |name: HeaderName| headers.get(name).map(|v| v.to_str().unwrap_or("?"));
     if !text(header::HOST).is_some_and(|host| hosts.iter().any(|h| h == host)) {
-        return Err("this page is served under the name of this machine only\n");
+        return Err("the host name of this page must be that of this machine\n");
     }
     let ours = |origin: &str| hosts.iter().any(|h| origin.strip_prefix("http://") == Some(h));
     if text(header::ORIGIN).is_some_and(|origin| !ours(origin)) {
-        return Err("requests of other sites are refused\n");
+        return Err("requests from other sites are refused\n");
     }
     let given = request.uri().path().split('/').nth(1).unwrap_or_default();
     if !same(given, &site.token) {
@@ -172,7 +176,7 @@ fn admit(site: &Site, request: &Request) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Compares without telling by its duration how much is right.
+/// Compares in constant time, so that the duration does not reveal a partly correct token.
 fn same(a: &str, b: &str) -> bool {
     let differ = a.bytes().zip(b.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
     a.len() == b.len() && differ == 0
@@ -187,7 +191,7 @@ async fn state(State(site): Shared) -> Response {
     json(text)
 }
 
-/// The state now and whenever it changes, as server-sent events.
+/// Streams the state now and after each change, as server-sent events.
 async fn events(State(site): Shared) -> Response {
     let mut receiver = site.board.watch();
     receiver.mark_changed();
@@ -202,7 +206,7 @@ async fn events(State(site): Shared) -> Response {
     ([(header::CONTENT_TYPE, "text/event-stream")], Body::from_stream(stream)).into_response()
 }
 
-/// `?run=<id>&from=<point>`
+/// Points of the curves of a run: `?run=<id>&from=<point>`.
 async fn curves(State(site): Shared, uri: Uri) -> Response {
     let number = |name: &str| -> Option<u64> {
         let pairs = uri.query().unwrap_or_default().split('&');
@@ -228,10 +232,10 @@ async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Respons
         let text = serde_json::to_string(&answer).unwrap_or_default();
         (code, [(header::CONTENT_TYPE, "application/json")], text).into_response()
     };
-    // Forms of other sites cannot send this type.
+    // Forms of other sites cannot send this content type.
     let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok());
     if !kind.is_some_and(|k| k.starts_with("application/json")) {
-        let answer = Answer::no("a command is JSON", "send it as application/json");
+        let answer = Answer::no("a command must be JSON", "send it as application/json");
         return refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, answer);
     }
     let body = match tokio::time::timeout(CLIENT_PATIENCE, to_bytes(body, MAX_BODY)).await {
@@ -242,13 +246,13 @@ async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Respons
     let command: Command = match serde_json::from_slice(&body) {
         Ok(command) => command,
         Err(e) => {
-            let answer = Answer::no(format!("this is no command: {e}"), "");
+            let answer = Answer::no(format!("this is not a command: {e}"), "");
             return refuse(StatusCode::BAD_REQUEST, answer);
         }
     };
     let (reply, answer) = oneshot::channel();
     if site.commands.try_send(Order { command, reply }).is_err() {
-        let answer = Answer::no("the session takes no more commands", "wait for the step to end");
+        let answer = Answer::no("too many commands are waiting", "wait for the step to end");
         return refuse(StatusCode::SERVICE_UNAVAILABLE, answer);
     }
     match answer.await {
@@ -260,7 +264,7 @@ async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Respons
     }
 }
 
-/// A file of a run that was saved in this session.
+/// A file of a run saved in this session.
 async fn saved(State(site): Shared, Path((folder, file)): Path<(String, String)>) -> Response {
     let path = site.board.file(&folder, &file);
     let bytes = path.and_then(|path| std::fs::read(path).ok());

@@ -1,4 +1,5 @@
-//! The run and everything that can be said of it, on a thread that takes commands between steps.
+//! This module implements the session: the thread that owns the run and takes commands between
+//! steps.
 
 use super::board::Board;
 use super::draft::Draft;
@@ -26,30 +27,33 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
-/// A command and where its answer is waited for.
+/// A command and the channel for its answer.
 pub struct Request {
+    /// The command.
     pub command: Command,
+    /// Channel for the answer.
     pub reply: oneshot::Sender<Answer>,
 }
 
-/// States are published no more often than this while running.
+/// Minimum interval of published states while running.
 const PUBLISH_EVERY: Duration = Duration::from_millis(100);
-/// How long a session that stands waits before it looks whether it is to end.
+/// Interval at which a paused session checks whether it is to end.
 const LOOK_UP: Duration = Duration::from_millis(200);
-/// A recording that is not shown any more is served this much longer, for pages to let go of it.
+/// Time for which a replaced recording is still served, until pages have switched.
 const FAREWELL: Duration = Duration::from_secs(5);
-/// How the time of a step grows with unknowns: between assembly and factorisation.
+/// Exponent of the growth of the step time with the number of unknowns, between those of assembly
+/// and factorisation.
 const STEP_GROWTH: f64 = 1.3;
-/// How the time of the solver grows with unknowns.
+/// Exponent of the growth of the solver time with the number of unknowns.
 const SOLVER_GROWTH: f64 = 1.5;
-/// Steps after which their mean time is remembered.
+/// Number of steps after which the step time is remembered.
 const SETTLED: usize = 5;
-/// Longest name of a pin.
+/// Maximum length of the name of a pinned run (characters).
 const MAX_PIN_NAME: usize = 48;
-/// Most runs whose folders are remembered.
+/// Maximum number of listed saved runs.
 const MOST_SAVED: usize = 50;
 
-/// See the module.
+/// The session.
 pub struct Session {
     library: Library,
     out: PathBuf,
@@ -57,9 +61,9 @@ pub struct Session {
     board: Arc<Board>,
     interrupted: Arc<AtomicBool>,
     mode: Mode,
-    /// Name in the library.
+    /// Id of the scene in the library.
     scene: String,
-    /// `accuracy.cells` of the scene's text.
+    /// Value of `accuracy.cells` in the text of the scene.
     own_cells: u32,
     live: Option<Live>,
     problem: Option<Problem>,
@@ -67,21 +71,22 @@ pub struct Session {
     switches: Vec<Switch>,
     dial: Vec<Stop>,
     effects: Vec<Effect>,
-    /// Last value of each knob that was not zero.
+    /// Last nonzero value of each knob.
     last: IndexMap<String, String>,
-    /// Seconds that a step of what was computed so far took.
+    /// Step time (s) of each computation so far, by its identifier.
     measured: HashMap<String, f64>,
     pins: Vec<Pin>,
     saved: Vec<SavedState>,
     news: Option<News>,
     stage: Option<Stage>,
     retired: Vec<(Instant, Stage)>,
-    /// Numbers given to runs, pins and recordings so far.
+    /// Number of the last run, pin or recording.
     count: u64,
     published: Option<Instant>,
 }
 
 impl Session {
+    /// A session without a scene.
     pub fn new(
         library: Library,
         out: PathBuf,
@@ -127,14 +132,14 @@ impl Session {
         self.publish();
     }
 
-    /// Takes commands and steps until told to end.
+    /// Takes commands and steps until it is told to end.
     pub fn serve(&mut self) {
         while !self.interrupted.load(Ordering::SeqCst) {
             let running = self.mode == Mode::Running;
             let wait = if running { Duration::ZERO } else { LOOK_UP };
             match self.commands.recv_timeout(wait) {
                 Ok(Request { command: Command::Quit {}, reply }) => {
-                    // A page that is gone needs no answer, here and below.
+                    // If the page is gone it needs no answer, here and below.
                     let _ = reply.send(Answer::yes("grainscope ends"));
                     self.tell(true, "grainscope has ended; this page shows its last state");
                     self.publish();
@@ -179,19 +184,22 @@ impl Session {
             _ => {}
         }
         let Some(live) = &mut self.live else {
-            return Answer::no("there is no run", "pick a scene, or mend the one that has errors");
+            return Answer::no(
+                "there is no run",
+                "pick a scene, or correct the one that has errors",
+            );
         };
         let step = live.run.row().step;
         match command {
             Command::Run {} if self.mode.goes_on() => {
                 live.paused();
                 self.mode = Mode::Running;
-                Answer::yes(format!("runs on from step {step}"))
+                Answer::yes(format!("running from step {step}"))
             }
             Command::Run {} | Command::Restart {} => self.restart("from the beginning"),
             Command::Pause {} if self.mode.goes_on() => {
                 self.stand(Mode::Paused);
-                Answer::yes(format!("stands at step {step}"))
+                Answer::yes(format!("paused at step {step}"))
             }
             Command::Stop {} if self.mode.goes_on() => {
                 self.stand(Mode::Stopped);
@@ -206,7 +214,7 @@ impl Session {
                     (Some(live), Mode::Paused | Mode::Finished) => {
                         Answer::yes(format!("step {}", live.run.row().step))
                     }
-                    _ => Answer::no("the step could not be taken", "see what is wrong above"),
+                    _ => Answer::no("the step could not be taken", "see the error above"),
                 }
             }
             Command::Pause {} | Command::Stop {} | Command::Step {} => {
@@ -247,7 +255,7 @@ impl Session {
         }
     }
 
-    /// Stops taking steps, with a picture of where that is.
+    /// Pauses or ends the run, with a picture of the present instant.
     fn stand(&mut self, mode: Mode) {
         self.mode = mode;
         let Some(live) = &mut self.live else { return };
@@ -266,7 +274,7 @@ impl Session {
         }
     }
 
-    /// Opens a recording of what there is, and lets go of the one before.
+    /// Opens a recording of the present run and pins, and retires the previous one.
     fn set_stage(&mut self) {
         let number = self.number();
         let Some(live) = &self.live else { return };
@@ -280,11 +288,11 @@ impl Session {
         }
     }
 
-    /// Closes recordings that no page looks at any more.
+    /// Closes retired recordings.
     fn dismiss(&mut self) {
         let due = |since: &Instant| since.elapsed() > FAREWELL;
         while self.retired.first().is_some_and(|(since, _)| due(since)) {
-            // Whatever is wrong with it, nobody looks.
+            // Nobody looks at it, so its errors do not matter.
             let _ = self.retired.remove(0).1.close();
         }
     }
@@ -297,7 +305,7 @@ impl Session {
         }
     }
 
-    /// The mode of a run that starts in place of the present one.
+    /// Mode of a run that replaces the present one.
     fn mode_of_next(&self) -> Mode {
         if self.mode == Mode::Paused { Mode::Paused } else { Mode::Running }
     }
@@ -306,7 +314,7 @@ impl Session {
         self.library.look();
         let mode = self.mode_of_next();
         let refused = |e: &SceneError| {
-            Answer::no(e.headline(), e.remedy().unwrap_or("see what is wrong with it above"))
+            Answer::no(e.headline(), e.remedy().unwrap_or("see the error messages above"))
         };
         match self.library.find(scene) {
             Ok(source) => match self.begin_scene(scene, source.clone(), mode) {
@@ -321,7 +329,7 @@ impl Session {
         }
     }
 
-    /// Starts a scene; if it has errors the run before stays.
+    /// Starts a scene. If it has errors, the present run is kept.
     fn begin_scene(&mut self, id: &str, source: SceneSource, mode: Mode) -> Result<(), SceneError> {
         let draft = Draft::new(source.clone());
         let plan = match draft.plan() {
@@ -338,7 +346,7 @@ impl Session {
         self.begin(draft, plan, mode)
     }
 
-    /// Starts a run in place of the present one.
+    /// Starts a run that replaces the present one.
     fn begin(
         &mut self,
         draft: Draft,
@@ -358,7 +366,7 @@ impl Session {
         let Some(live) = &mut self.live else { return Ok(()) };
         let frame = live.observe(true, &self.board);
         self.board.sketch(&live.info, frame);
-        // The page shows the first picture before the knobs are looked into.
+        // The first picture is shown before the knobs are examined.
         self.knobs.clear();
         self.switches.clear();
         self.dial.clear();
@@ -369,7 +377,7 @@ impl Session {
         Ok(())
     }
 
-    /// Finds out what knobs would do.
+    /// Determines the effects of the knobs.
     fn examine(&mut self) {
         let Some(live) = &self.live else { return };
         self.knobs = knobs::knobs(&live.draft, &live.values);
@@ -465,7 +473,7 @@ impl Session {
         self.board.copy(live.id, id);
         self.pins.push(Pin { state, info, film: live.film.clone() });
         self.set_stage();
-        Answer::yes(format!("pinned as `{name}`; the next run stands beside it"))
+        Answer::yes(format!("pinned as `{name}`; the next run is shown beside it"))
     }
 
     fn unpin(&mut self, name: &str) -> Answer {
@@ -480,7 +488,7 @@ impl Session {
 
     fn save(&mut self, name: &str) -> Answer {
         if self.mode == Mode::Running {
-            // What is saved is what is seen.
+            // The saved state is the state shown.
             self.stand(Mode::Paused);
         }
         let Some(live) = &mut self.live else { return Answer::no("there is no run", "") };
@@ -532,7 +540,7 @@ impl Session {
         };
         match serde_json::to_string(&state) {
             Ok(text) => self.board.publish(text),
-            Err(e) => eprintln!("warning: the page is not told the state: {e}"),
+            Err(e) => eprintln!("warning: the state cannot be sent to the page: {e}"),
         }
     }
 
@@ -551,7 +559,7 @@ impl Session {
                 let phases = live.phases();
                 let solver = phases.assemble + phases.factor + phases.solve;
                 let less = (s.unknowns[1] as f64 / s.unknowns[0] as f64).powf(SOLVER_GROWTH);
-                // Of a step with the effect, whichever is running.
+                // Solver time of a step with the effect, whether or not it is solved now.
                 let with = if s.on { solver } else { solver / less };
                 let share = with * (1.0 - less) / (phases.total() - solver + with);
                 format!("about {:.0} % of a step, by its unknowns", 100.0 * share)
@@ -594,7 +602,7 @@ fn run_state(live: &Live) -> RunState {
         readings.push(Reading { name: name("rate"), value: now.rate, unit: "m²/s" });
         readings.push(Reading { name: name("volume"), value: now.volume, unit: "m²" });
     }
-    if let Some(value) = row.alignment {
+    if let Some(value) = row.mean_alignment {
         readings.push(Reading { name: "mean |n_x|".into(), value, unit: "" });
     }
     readings.push(Reading { name: "largest speed".into(), value: row.max_speed, unit: "m/s" });
@@ -619,7 +627,7 @@ fn run_state(live: &Live) -> RunState {
     }
 }
 
-/// What must hold at every step, by the bounds of the stress tests.
+/// Diagnostics with the bounds of the stress tests.
 fn lights(live: &Live) -> Vec<Light> {
     let row = live.run.row();
     let drift = row.drift.iter().map(|d| d.abs()).fold(0.0, f64::max);
@@ -627,11 +635,11 @@ fn lights(live: &Live) -> Vec<Light> {
         name,
         value,
         bound,
-        // Not a number is not good.
+        // False for NaN.
         good: value <= bound,
         meaning,
     };
-    // A solver that was told to be coarse leaves as much divergence.
+    // The divergence error grows with the tolerance of the solver.
     let divergence = CRITERIA.divergence.max(10.0 * live.plan.method.tolerance);
     vec![
         light(
@@ -650,7 +658,7 @@ fn lights(live: &Live) -> Vec<Light> {
             "volume error",
             drift,
             CRITERIA.drift,
-            "change of a material's area as the solver sees it since the beginning, the largest",
+            "largest relative change of a material's projected area since the start",
         ),
         light(
             "corrections",

@@ -1,4 +1,4 @@
-//! What the viewer shows: the run, and pinned ones beside it.
+//! This module streams the run, and pinned runs beside it, to the viewer.
 
 use super::film::Film;
 use super::live::Live;
@@ -8,24 +8,29 @@ use crate::record::logger::{Backpressure, Logger};
 use crate::record::rerun_log::{Lane, RecordError, RerunLog, Sink};
 use std::sync::Arc;
 
-/// Most runs that are pinned at a time: each keeps its pictures.
+/// Maximum number of pinned runs: each keeps its pictures in memory.
 pub const MOST_PINS: usize = 6;
 
-/// A run that is kept as it was.
+/// A pinned run: a copy of a run at the time of pinning.
 pub struct Pin {
+    /// State shown on the page.
     pub state: PinState,
+    /// Constant part of its recording.
     pub info: RunInfo,
+    /// Its frames.
     pub film: Film,
 }
 
-/// A recording that is being shown.
+/// A recording that the viewer shows.
 pub struct Stage {
+    /// Address of the recording.
     pub stream: Stream,
     logger: Logger,
 }
 
 impl Stage {
-    /// Opens a recording of a run so far, beside the pins; `number` tells it from others.
+    /// Opens a recording of the run so far, beside the pinned runs; `number` makes its identifier
+    /// unique.
     pub fn open(pins: &[Pin], live: &Live, number: u64) -> Result<Stage, RecordError> {
         let mut info = live.info.clone();
         info.recording_id = format!("{}-{number}", info.recording_id);
@@ -42,12 +47,12 @@ impl Stage {
         Ok(Stage { stream: Stream { url, recording: info.recording_id }, logger })
     }
 
-    /// Shows a frame; `false` if nobody can see it any more.
+    /// Sends a frame; `false` if the recording has ended.
     pub fn show(&mut self, frame: &Arc<Frame>) -> bool {
         self.logger.send(Frame::clone(frame)).is_ok()
     }
 
-    /// Ends the recording, and says what went wrong with it.
+    /// Ends the recording; returns its error, if any.
     pub fn close(self) -> Option<RecordError> {
         self.logger.finish().0.err()
     }

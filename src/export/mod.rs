@@ -1,6 +1,6 @@
-//! The pictures of a recording as files for other programs: VTK's (ParaView), and plain tables.
+//! This module exports the pictures of a recording: VTK files (ParaView) and CSV tables.
 //!
-//! A file for each frame with the particles, one with the fields, numbered alike.
+//! Each frame has a file with the particles and a file with the fields, with the same number.
 
 mod tables;
 mod vtu;
@@ -10,49 +10,61 @@ use crate::frame::{GridField, ParticleSnapshot};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Times that differ by less, relative to the last, are those of one frame.
+/// Relative difference below which times belong to the same frame.
 const SAME_TIME: f64 = 1e-9;
 
-/// Why nothing was exported.
+/// Error of exporting a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
+    /// The run cannot be read.
     #[error(transparent)]
     Run(#[from] CompareError),
-    #[error("{}: has no recording to export from; run the scene again without --no-recording", .0.display())]
+    /// The run has no recording.
+    #[error("{}: has no recording to export; run the scene again without --no-recording", .0.display())]
     NoRecording(PathBuf),
-    #[error("{}: its recording holds no pictures", .0.display())]
+    /// The recording has no pictures.
+    #[error("{}: its recording has no pictures", .0.display())]
     NoPictures(PathBuf),
+    /// A file or folder cannot be written.
     #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    Write {
+        /// Path of the file or folder.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
 }
 
-/// What is written.
+/// File format of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// `.vtu` files and a `.pvd` series of them.
+    /// VTK unstructured grids (`.vtu`) and a `.pvd` index of them.
     Vtu,
     /// Comma-separated tables.
     Csv,
 }
 
-/// One instant.
+/// Particles and fields at one instant.
 #[derive(Clone, Debug, Default)]
 pub struct Instant {
+    /// Simulated time (s).
     pub time_s: f64,
+    /// Particles, if recorded at this time.
     pub particles: Option<ParticleSnapshot>,
-    /// All on the grid of the first.
+    /// Fields, all on the grid of the first one.
     pub fields: Vec<GridField>,
 }
 
-/// All pictures of a run, in order.
+/// All pictures of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Film {
+    /// Instants in order of time.
     pub instants: Vec<Instant>,
-    /// Names by the numbers that particles carry.
+    /// Material names; the class of a particle is an index into them.
     pub materials: Vec<String>,
 }
 
-/// Reads the pictures of a run: its folder, or a recording.
+/// Reads the pictures of a run from its folder or a recording.
 pub fn read(run: &Path) -> Result<Film, ExportError> {
     let member = Member::open(run)?;
     let (Some(recorded), Some(info)) = (&member.recorded, &member.info) else {
@@ -80,7 +92,7 @@ pub fn read(run: &Path) -> Result<Film, ExportError> {
     Ok(film)
 }
 
-/// Writes everything into a folder; how many files.
+/// Writes all pictures into a folder. Returns the number of files.
 pub fn write(film: &Film, format: Format, folder: &Path) -> Result<usize, ExportError> {
     std::fs::create_dir_all(folder)
         .map_err(|source| ExportError::Write { path: folder.to_owned(), source })?;
@@ -95,7 +107,7 @@ fn write_file(path: PathBuf, text: impl AsRef<[u8]>) -> Result<(), ExportError> 
 }
 
 impl Film {
-    /// The instant of a time, made if it is not there.
+    /// The instant at a time, created if it does not exist.
     fn at(&mut self, time_s: f64) -> &mut Instant {
         let before = time_s - SAME_TIME * time_s.abs();
         let k = self.instants.partition_point(|i| i.time_s < before);

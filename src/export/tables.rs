@@ -1,10 +1,11 @@
-//! Tables: a row for each particle, and for each sample of the fields.
+//! This module writes CSV tables: a row for each particle, and for each sample of the fields.
 
 use super::{ExportError, Film, Instant, write_file};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes `particles_<n>.csv`, `fields_<n>.csv` and `frames.csv`, which has their times.
+/// Writes `particles_<n>.csv` and `fields_<n>.csv`, and `frames.csv` with their times. Returns the
+/// number of files.
 pub(super) fn write(film: &Film, folder: &Path) -> Result<usize, ExportError> {
     let mut frames = String::from("frame,time\n");
     let mut files = 1;

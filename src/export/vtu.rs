@@ -1,4 +1,5 @@
-//! VTK's unstructured grids (XML, numbers in base64), and the series of them that ParaView opens.
+//! This module writes VTK unstructured grids (XML, binary data in base64), and the `.pvd` index
+//! that ParaView opens.
 
 use super::{ExportError, Film, Instant, write_file};
 use crate::frame::{GridField, ParticleSnapshot};
@@ -6,15 +7,16 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::Path;
 
-/// VTK's numbers for kinds of cells.
+/// VTK cell type of a single point.
 const VERTEX: u8 = 1;
+/// VTK cell type of a quadrilateral.
 const QUAD: u8 = 9;
 
-/// Cells with numbers at their points or on them.
+/// An unstructured grid with data at its points or cells.
 #[derive(Default)]
 struct Grid {
     points: Vec<[f32; 2]>,
-    /// Points of each cell; all have as many.
+    /// Point indices of all cells; each cell has `points_per_cell`.
     cells: Vec<i64>,
     points_per_cell: usize,
     kind: u8,
@@ -22,7 +24,8 @@ struct Grid {
     cell_data: String,
 }
 
-/// Writes `particles_<n>.vtu`, `fields_<n>.vtu`, and for each a `.pvd` with their times.
+/// Writes `particles_<n>.vtu` and `fields_<n>.vtu`, a `.pvd` index with the times for each, and
+/// `materials.csv`. Returns the number of files.
 pub(super) fn write(film: &Film, folder: &Path) -> Result<usize, ExportError> {
     let particles = |i: &Instant| i.particles.as_ref().map(particles);
     let fields = |i: &Instant| (!i.fields.is_empty()).then(|| fields(&i.fields));
@@ -92,7 +95,7 @@ fn fields(fields: &[GridField]) -> Grid {
     }
 }
 
-/// An array of numbers, behind their length as VTK wants it.
+/// A data array: base64 of the length in bytes (u64) followed by the data, as VTK requires.
 fn array(name: &str, kind: &str, components: usize, bytes: Vec<u8>) -> String {
     let mut block = (bytes.len() as u64).to_le_bytes().to_vec();
     block.extend(bytes);

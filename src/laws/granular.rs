@@ -1,40 +1,41 @@
-//! Viscosities of a grain assembly from its contacts, equations (14)-(17).
+//! This module computes the viscosities of a grain assembly from its contacts, equations
+//! (14)-(17).
 //!
 //! ```text
 //! eta   = (1-n) k (eta_n + eta_m) / (4 pi)
 //! eta_c = (1-n) k eta_m / (2 pi)
 //! B     = (1-n) k eta_n / (2 pi)
 //! ```
-//! (16) is printed with `eta_m`; isotropic compression moves contacts only along their normals,
-//! so `eta_n` is meant, as in the elastic model it derives from.
+//! Equation (16) is printed with `eta_m`. Isotropic compression moves contacts only along their
+//! normals, so `eta_n` is meant, as in the elastic model from which the equation derives.
 
 use std::f64::consts::PI;
 
-/// Porosity, contacts and contact dashpots of a grain assembly.
+/// Porosity, coordination number and contact dashpots of a grain assembly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contacts {
-    /// n, 0 to 1.
+    /// Porosity n, the volume fraction of voids, 0 to 1.
     pub porosity: f64,
-    /// k, contacts per grain.
+    /// Coordination number k, contacts per grain.
     pub coordination: f64,
-    /// eta_n, Pa s.
+    /// Viscosity eta_n of a contact in the normal direction, Pa s.
     pub normal_dashpot: f64,
-    /// eta_m, Pa s.
+    /// Viscosity eta_m of a contact in the tangential direction, Pa s.
     pub tangential_dashpot: f64,
 }
 
 /// Macroscopic viscosities, Pa s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viscosities {
-    /// eta
+    /// Shear viscosity eta, Pa s.
     pub shear: f64,
-    /// eta_c
+    /// Coupling viscosity eta_c, Pa s.
     pub coupling: f64,
-    /// B
+    /// Bulk viscosity B, Pa s.
     pub bulk: f64,
 }
 
-/// Equations (14)-(16).
+/// Macroscopic viscosities of a grain assembly, equations (14)-(16).
 pub fn viscosities(c: &Contacts) -> Viscosities {
     let density = (1.0 - c.porosity) * c.coordination;
     Viscosities {

@@ -5,6 +5,7 @@ use crate::plan::Gauge;
 use crate::space::flow::Flow;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
+use crate::space::segment::Segment;
 use crate::space::shape::Shape;
 
 /// A gauge and the volume that has crossed it.
@@ -27,23 +28,23 @@ impl Counter {
 
     /// Counts a particle's straight path (not wrapped).
     pub fn pass(&mut self, mesh: &Mesh, from: [f64; 2], to: [f64; 2], material: u8, volume: f64) {
-        let g = &self.gauge;
-        if material != g.material {
+        let Gauge { segment: s, sign, .. } = self.gauge;
+        if material != self.gauge.material {
             return;
         }
-        let axis = if g.normal == 0 { &mesh.x } else { &mesh.y };
+        let (axis, _) = mesh.axes(s.normal);
         let period = if axis.periodic() { axis.length() } else { 0.0 };
         let images: &[f64] = if axis.periodic() { &[0.0, -1.0, 1.0] } else { &[0.0] };
         for image in images {
-            let at = g.at + image * period;
-            let (a, b) = (from[g.normal], to[g.normal]);
+            let at = s.at + image * period;
+            let (a, b) = (from[s.normal], to[s.normal]);
             if (a >= at) == (b >= at) {
                 continue;
             }
             let t = (at - a) / (b - a);
-            let along = from[1 - g.normal] + t * (to[1 - g.normal] - from[1 - g.normal]);
-            if along >= g.from && along <= g.to {
-                self.volume += if b >= at { g.sign * volume } else { -g.sign * volume };
+            let along = from[1 - s.normal] + t * (to[1 - s.normal] - from[1 - s.normal]);
+            if along >= s.from && along <= s.to {
+                self.volume += if b >= at { sign * volume } else { -sign * volume };
             }
         }
     }
@@ -58,25 +59,24 @@ impl Counter {
         background: Option<u8>,
     ) -> f64 {
         let g = &self.gauge;
-        let (across, along) = if g.normal == 0 { (&mesh.x, &mesh.y) } else { (&mesh.y, &mesh.x) };
-        let line = across.nearest_line(g.at);
-        let (first, last) = (along.nearest_line(g.from), along.nearest_line(g.to));
+        let Segment { normal, at, from, to } = g.segment;
+        let (across, along) = mesh.axes(normal);
+        let line = across.nearest_line(at);
+        let (first, last) = (along.nearest_line(from), along.nearest_line(to));
         let below =
             if line > 0 { Some(line - 1) } else { across.periodic().then(|| across.cells() - 1) };
         let above = (line < across.cells()).then_some(line);
-        let cell_at =
-            |m: usize, k: usize| if g.normal == 0 { mesh.cell(m, k) } else { mesh.cell(k, m) };
         let mut flux = 0.0;
         for k in first..last {
-            let [low, high] = [below, above].map(|m| m.map(|m| cell_at(m, k)));
+            let [low, high] = [below, above].map(|m| m.map(|m| mesh.cell_across(normal, m, k)));
             let Some(owner) = high.or(low) else { continue };
             let edge = if high.is_some() { -1.0 } else { 1.0 };
             let nodal = flow.of_cell(mesh, owner);
             for s in 0..SAMPLES {
                 let t = (2 * s + 1) as f64 / SAMPLES as f64 - 1.0;
-                let r = if g.normal == 0 { [edge, t] } else { [t, edge] };
+                let r = if normal == 0 { [edge, t] } else { [t, edge] };
                 let n = Shape::values(r);
-                let u: f64 = (0..9).map(|a| n[a] * nodal[a][g.normal]).sum();
+                let u: f64 = (0..9).map(|a| n[a] * nodal[a][normal]).sum();
                 let p = mesh.from_reference(owner, r);
                 let upstream = if u > 0.0 { low } else { high }.unwrap_or(owner);
                 let share = fraction(mesh, particles, upstream, p, g.material, background);

@@ -1,56 +1,57 @@
-//! Boundary conditions of a scene, and the constraints and loads they become.
+//! This module turns the boundary conditions of a scene into constraints.
 
 use super::Units;
 use crate::scene::FieldFn;
 use crate::space::constraints::Constraints;
 use crate::space::mesh::Mesh;
-use crate::space::shape::{GAUSS_5, NODES, Shape};
+use crate::space::segment::Segment;
 
-/// What a side of the domain prescribes; SI values and coordinates.
+/// Boundary conditions at a side of the domain, as functions of SI coordinates.
 #[derive(Clone, Debug, Default)]
 pub struct Side {
+    /// Whether the side is joined to the opposite side.
     pub periodic: bool,
+    /// Prescribed velocity along x and y, m/s.
     pub velocity: [Option<FieldFn>; 2],
+    /// Prescribed traction along x and y, Pa.
     pub traction: [Option<FieldFn>; 2],
+    /// Prescribed Cosserat rotation rate, 1/s.
     pub rotation: Option<FieldFn>,
 }
 
-/// A wall along a mesh line, by node numbers.
+/// A wall along mesh lines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WallLine {
-    /// 0: vertical, the normal is x; 1: horizontal.
-    pub normal: usize,
-    /// Node number along the normal.
-    pub line: usize,
-    /// First and last node along the wall.
-    pub from: usize,
-    pub to: usize,
+    /// The segment, in the plan's units; it lies on mesh lines.
+    pub segment: Segment,
+    /// Whether the tangential velocity is zero too.
     pub no_slip: bool,
-    /// SI, 1/s.
+    /// Prescribed Cosserat rotation rate, 1/s (SI).
     pub rotation: Option<f64>,
 }
 
 /// All boundary conditions.
 #[derive(Clone, Debug, Default)]
 pub struct BoundaryPlan {
-    /// left, right, bottom, top
+    /// Sides of the domain: left, right, bottom, top.
     pub sides: [Side; 4],
+    /// Walls and sides of blocks.
     pub walls: Vec<WallLine>,
-    /// Directions in which nothing holds the scene.
+    /// Directions (x, y) in which no boundary condition prevents a rigid translation.
     pub free_translation: [bool; 2],
-    /// The pressure is known up to a constant.
+    /// Whether the pressure is determined only up to a constant.
     pub closed: bool,
 }
 
 /// Names of the sides, in the order of [`BoundaryPlan::sides`].
 pub const SIDES: [&str; 4] = ["left", "right", "bottom", "top"];
 
-/// Normal direction of a side.
+/// Direction of the normal of a side: 0 for x, 1 for y.
 pub fn side_normal(side: usize) -> usize {
     side / 2
 }
 
-/// Nodes of a side.
+/// Mesh nodes on a side.
 fn side_nodes(mesh: &Mesh, side: usize) -> Vec<usize> {
     let (ni, nj) = (mesh.x.nodes(), mesh.y.nodes());
     match side {
@@ -61,18 +62,9 @@ fn side_nodes(mesh: &Mesh, side: usize) -> Vec<usize> {
     }
 }
 
-impl WallLine {
-    fn nodes<'a>(&'a self, mesh: &'a Mesh) -> impl Iterator<Item = usize> + 'a {
-        // A wall may end on the seam of a periodic axis.
-        (self.from..=self.to).map(|k| match self.normal {
-            0 => mesh.node(self.line, k % mesh.y.nodes()),
-            _ => mesh.node(k % mesh.x.nodes(), self.line),
-        })
-    }
-}
-
 impl BoundaryPlan {
-    /// Given nodal values. Where boundaries meet, normal velocities win over tangential ones.
+    /// Prescribed nodal values. Where boundaries meet, normal velocities take precedence over
+    /// tangential ones.
     pub fn constraints<const D: usize>(&self, mesh: &Mesh, units: &Units) -> Constraints<D> {
         let mut out = Constraints::new(mesh);
         for pass in 0..2 {
@@ -86,8 +78,9 @@ impl BoundaryPlan {
             }
             for wall in &self.walls {
                 if pass == 0 || wall.no_slip {
-                    let c = if pass == 0 { wall.normal } else { 1 - wall.normal };
-                    wall.nodes(mesh).for_each(|node| out.fix(node, c, 0.0));
+                    let normal = wall.segment.normal;
+                    let c = if pass == 0 { normal } else { 1 - normal };
+                    wall.segment.nodes(mesh).for_each(|node| out.fix(node, c, 0.0));
                 }
             }
         }
@@ -101,7 +94,7 @@ impl BoundaryPlan {
             }
             for wall in &self.walls {
                 if let Some(w) = wall.rotation {
-                    wall.nodes(mesh).for_each(|node| out.fix(node, 2, w / units.rate()));
+                    wall.segment.nodes(mesh).for_each(|node| out.fix(node, 2, w / units.rate()));
                 }
             }
         }
@@ -121,37 +114,8 @@ impl BoundaryPlan {
         f.at(x * units.length, y * units.length)
     }
 
-    /// Adds the nodal forces of given tractions.
-    pub fn add_tractions<const D: usize>(&self, mesh: &Mesh, units: &Units, load: &mut [[f64; D]]) {
-        for (s, side) in self.sides.iter().enumerate() {
-            let normal = side_normal(s);
-            let edge = if s % 2 == 0 { -1.0 } else { 1.0 };
-            let along = if normal == 0 { &mesh.y } else { &mesh.x };
-            for c in 0..2 {
-                let Some(f) = &side.traction[c] else { continue };
-                for k in 0..along.cells() {
-                    let across = if normal == 0 { mesh.x.cells() } else { mesh.y.cells() };
-                    let m = if s % 2 == 0 { 0 } else { across - 1 };
-                    let cell = if normal == 0 { mesh.cell(m, k) } else { mesh.cell(k, m) };
-                    if mesh.solid[cell] {
-                        continue;
-                    }
-                    let nodes = mesh.cell_nodes(cell);
-                    for (t, weight) in GAUSS_5 {
-                        let r = if normal == 0 { [edge, t] } else { [t, edge] };
-                        let p = mesh.from_reference(cell, r).map(|v| v * units.length);
-                        let n = Shape::values(r);
-                        let force = weight * along.size(k) * f.at(p[0], p[1]) / units.stress();
-                        for a in 0..NODES {
-                            load[nodes[a]][c] += force * n[a];
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// Net outflow through the sides' given normal velocities, and the sum of its magnitudes.
+    /// Net outflow due to the prescribed normal velocities of the sides, and the integral of their
+    /// magnitudes.
     pub fn net_outflow<const D: usize>(&self, mesh: &Mesh, given: &Constraints<D>) -> (f64, f64) {
         const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
         let (mut net, mut total) = (0.0, 0.0);
@@ -161,7 +125,7 @@ impl BoundaryPlan {
                 continue;
             }
             let sign = if s % 2 == 0 { -1.0 } else { 1.0 };
-            let axis = if normal == 0 { &mesh.y } else { &mesh.x };
+            let (_, axis) = mesh.axes(normal);
             let nodes = side_nodes(mesh, s);
             for k in 0..axis.cells() {
                 for (a, weight) in SIMPSON.iter().enumerate() {
@@ -173,32 +137,5 @@ impl BoundaryPlan {
             }
         }
         (net, total)
-    }
-}
-
-/// Nodal forces of a force and couple per volume fixed in space (SI), integrated by 5 x 5 Gauss
-/// points.
-pub fn add_body_force<const D: usize>(
-    mesh: &Mesh,
-    units: &Units,
-    force: &[FieldFn; 3],
-    load: &mut [[f64; D]],
-) {
-    let scale = [units.force_density(), units.force_density(), units.stress()];
-    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-        let nodes = mesh.cell_nodes(cell);
-        for (eta, wy) in GAUSS_5 {
-            for (xi, wx) in GAUSS_5 {
-                let p = mesh.from_reference(cell, [xi, eta]).map(|v| v * units.length);
-                let n = Shape::values([xi, eta]);
-                let volume = wx * wy * mesh.cell_area(cell);
-                for c in 0..D {
-                    let f = volume * force[c].at(p[0], p[1]) / scale[c];
-                    for a in 0..NODES {
-                        load[nodes[a]][c] += f * n[a];
-                    }
-                }
-            }
-        }
     }
 }

@@ -1,28 +1,43 @@
-//! Which effects a scene calls for, why, and what each brings: the answer of `grainscope plan`.
+//! This module lists the effects that a scene needs, with the reason for each and its cost, for
+//! `grainscope plan`.
 
 use super::Plan;
 use crate::scene::Quadrature;
 use serde::Serialize;
 
-/// What a scene may call for.
+/// Effects that a scene may need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EffectKind {
+    /// Velocity and pressure.
     Flow,
+    /// Cosserat rotation.
     Rotation,
+    /// Directors of layered materials.
     Directors,
+    /// Gravity.
     Gravity,
+    /// Stabilisation of stable stratification at large steps.
     Stabilisation,
+    /// Force and couple per volume, fixed in space.
     BodyForce,
+    /// Acceleration fixed in space.
     Acceleration,
+    /// Viscosity carried by particles.
     CarriedViscosity,
+    /// Density carried by particles.
     CarriedDensity,
+    /// Volume change (finite bulk viscosity).
     VolumeChange,
+    /// Dye lines.
     Dye,
+    /// Gauges.
     Gauges,
+    /// Cells that contain several materials.
     CutCells,
 }
 
 impl EffectKind {
+    /// Name of the effect.
     pub fn name(self) -> &'static str {
         use EffectKind::*;
         match self {
@@ -43,51 +58,67 @@ impl EffectKind {
     }
 }
 
-/// One effect: solved or left out, and why.
+/// An effect, whether it is solved, and why.
 #[derive(Clone, Debug, Serialize)]
 pub struct Effect {
+    /// Kind of effect.
     #[serde(skip)]
     pub kind: EffectKind,
+    /// Name of the effect.
     pub name: &'static str,
+    /// Whether the effect is solved.
     pub solved: bool,
+    /// Reason for solving the effect or not.
     pub why: String,
-    /// Unknowns it adds.
+    /// Number of unknowns that the effect adds.
     pub unknowns: usize,
-    /// Bytes it adds to each particle.
+    /// Number of bytes that the effect adds to each particle.
     pub particle_bytes: usize,
-    /// Stages of a step it adds.
+    /// Stages of a step that the effect adds.
     pub stages: Vec<&'static str>,
-    /// Share of a step's time, if it was measured.
+    /// Measured fraction of the time of a step, if available.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share: Option<f64>,
 }
 
-/// What a step takes, measured.
+/// Measured computing time of a step.
 #[derive(Clone, Debug, Serialize)]
 pub struct StepTime {
-    /// Steps that were measured.
+    /// Number of measured steps.
     pub steps: u32,
-    /// Seconds of a processor for a step, their median.
+    /// Median processor time of a step, s.
     pub seconds: f64,
-    /// Seconds of a step by phase, their mean.
+    /// Mean processor time of each phase of a step, s.
     pub phases: Vec<(&'static str, f64)>,
 }
 
-/// All effects with the sizes of the problem.
+/// All effects and the sizes of the problem.
 #[derive(Clone, Debug, Serialize)]
 pub struct EffectList {
+    /// Name of the scene.
     pub scene: String,
+    /// Number of cells along x and y.
     pub cells: [usize; 2],
+    /// Smallest cell size along x and y, m.
     pub smallest_cell: [f64; 2],
+    /// Largest cell size along x and y, m.
     pub largest_cell: [f64; 2],
+    /// Number of velocity and rotation unknowns.
     pub unknowns: usize,
+    /// Number of pressure unknowns.
     pub pressure_unknowns: usize,
+    /// Number of particles per cell at the start.
     pub particles_per_cell: usize,
+    /// Names of the quantities stored for each particle.
     pub particle_columns: Vec<&'static str>,
+    /// Names of the stages of a step.
     pub stages: Vec<&'static str>,
+    /// All effects, solved or not.
     pub effects: Vec<Effect>,
+    /// Measured computing time of a step, if available.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<StepTime>,
+    /// Warnings about the scene.
     pub warnings: Vec<String>,
 }
 
@@ -99,7 +130,7 @@ impl EffectList {
 }
 
 impl Plan {
-    /// What will be solved, and why.
+    /// Lists the effects that are solved or not, with reasons.
     pub fn describe(&self) -> EffectList {
         let effects = self.list_effects();
         let e = &self.effects;
@@ -181,7 +212,7 @@ impl Plan {
                 e.rotation,
                 format!(
                     "coupling viscosity and internal length: {}",
-                    names(&|m| m.rotation.is_some())
+                    names(&|m| m.law.rotation.is_some())
                 ),
                 "no material has both a coupling viscosity and an internal length above zero",
             ),
@@ -194,7 +225,7 @@ impl Plan {
             e.directors,
             why(
                 e.directors,
-                format!("layered: {}", names(&|m| m.layer_viscosity.is_some())),
+                format!("layered: {}", names(&|m| m.law.is_layered())),
                 "no material has a layer viscosity other than its shear viscosity",
             ),
             0,
@@ -276,7 +307,7 @@ impl Plan {
             e.volume_change,
             why(
                 e.volume_change,
-                format!("finite bulk viscosity: {}", names(&|m| m.compliance > 0.0)),
+                format!("finite bulk viscosity: {}", names(&|m| m.law.compliance > 0.0)),
                 "every material is incompressible",
             ),
             0,

@@ -1,22 +1,24 @@
-//! What a run will need of a machine's memory, estimated beforehand, and what there is.
+//! This module estimates the memory that a run needs, and reads how much memory is available.
 
 use crate::plan::Plan;
 use sysinfo::System;
 
-/// Factor and updates that are kept, per cell and doubling of the mesh, with two unknowns a node: 860
-/// at 128 x 128 cells, 950 at 256 x 256 (`cargo bench --bench speed` prints both), more beyond.
+/// Memory of the stored factor and updates, bytes per cell and per doubling of the number of cells,
+/// with two unknowns per node: 860 at 128 x 128 cells, 950 at 256 x 256
+/// (`cargo bench --bench speed` prints both), more for larger meshes.
 const SOLVER_BYTES: f64 = 1150.0;
-/// As much more with rotation: `(3/2)^2` entries.
+/// Factor on [`SOLVER_BYTES`] with rotation: `(3/2)^2` times as many entries.
 const ROTATION: f64 = 2.25;
-/// Integration points, element matrices and vectors of a cell.
+/// Memory of the integration points, element matrices and vectors of a cell, bytes.
 const CELL_BYTES: f64 = 6e3;
-/// Columns of a particle: as it is, half a step ahead, and at the last good state.
+/// Memory of the columns of a particle, bytes: the current state, the state half a step ahead, and
+/// the last valid state.
 const PARTICLE_BYTES: f64 = 3.0 * 80.0;
-/// The program itself, recording and plots.
+/// Memory of the program itself, the recording and the plots, bytes.
 const BASE: f64 = 80e6;
 
-/// Bytes that a run needs, about: boxes of 64 x 64 to 512 x 512 cells with 16 particles each took 0.6 to
-/// 0.95 of it.
+/// Estimate of the memory that a run needs, bytes. Boxes of 64 x 64 to 512 x 512 cells with 16
+/// particles per cell took 0.6 to 0.95 of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
     solver: f64,
@@ -25,6 +27,7 @@ pub struct Memory {
 }
 
 impl Memory {
+    /// Estimates the memory that a run of this plan needs.
     pub fn of(plan: &Plan) -> Memory {
         let n = plan.mesh.cells() as f64;
         let rotation = if plan.effects.rotation { ROTATION } else { 1.0 };
@@ -35,7 +38,7 @@ impl Memory {
         }
     }
 
-    /// All of it.
+    /// Total memory, bytes.
     pub fn total(&self) -> f64 {
         BASE + self.solver + self.cells + self.particles
     }
@@ -54,18 +57,18 @@ impl std::fmt::Display for Memory {
     }
 }
 
-/// Bytes, in words.
+/// A number of bytes as text, in MB or GB.
 pub fn size(bytes: f64) -> String {
     if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
 }
 
-/// Bytes that this program may still take; `None` if nobody knows.
+/// Memory that this program may still allocate, bytes; `None` if unknown.
 pub fn available() -> Option<f64> {
     let mut system = System::new();
     system.refresh_memory();
     let free = system.available_memory();
-    // A container may have less than its machine. What its file cache holds is given back when asked
-    // for: only what programs hold counts.
+    // A container may have less memory than its machine. Its file cache is released on demand, so
+    // only the memory held by programs counts.
     let limit = system.cgroup_limits().map(|l| l.total_memory.saturating_sub(l.rss));
     let least = limit.filter(|&l| l > 0).map_or(free, |l| l.min(free));
     (least > 0).then_some(least as f64)

@@ -1,43 +1,49 @@
-//! Mesh lines: on everything that needs one, and graded towards what is singular.
+//! This module places mesh lines: on all required coordinates, and graded towards singular points.
 
-/// A coordinate that must be a mesh line, and what demands it.
+/// A required coordinate of a mesh line, and the object that requires it.
 #[derive(Clone, Debug)]
 pub struct Line {
+    /// Coordinate, m.
     pub at: f64,
-    /// For messages; explicit lines of the scene may lie as close as they like.
+    /// Object that requires the line, for messages.
     pub owner: String,
+    /// Whether the scene lists the line in `[mesh]`; such lines may be closer together than a cell.
     pub explicit: bool,
 }
 
-/// A coordinate towards which cells shrink.
+/// A coordinate towards which cells become smaller.
 #[derive(Clone, Copy, Debug)]
 pub struct Refinement {
+    /// Coordinate, m.
     pub at: f64,
-    /// Cells there are smaller by this factor.
+    /// Factor by which the cells there are smaller.
     pub factor: f64,
 }
 
-/// How large cells are.
+/// Cell sizes along an axis.
 #[derive(Clone, Debug)]
 pub struct Sizing {
-    /// Size away from refinements.
+    /// Cell size away from refinements, m.
     pub size: f64,
+    /// Coordinates towards which cells become smaller.
     pub refinements: Vec<Refinement>,
-    /// Ratio of neighbouring cells in graded parts.
+    /// Size ratio of neighbouring cells in graded parts.
     pub growth: f64,
 }
 
-/// Two demanded lines with less than a cell between them.
+/// An error: two required lines are less than a cell apart.
 #[derive(Debug)]
 pub struct TooClose {
+    /// The line with the smaller coordinate.
     pub first: Line,
+    /// The line with the larger coordinate.
     pub second: Line,
-    /// Cell size there.
+    /// Cell size between them, m.
     pub size: f64,
 }
 
 impl Sizing {
-    /// Cell size at a coordinate: geometric growth away from each refinement.
+    /// Cell size at a coordinate, m; sizes grow geometrically away from each refinement.
     fn at(&self, x: f64) -> f64 {
         let slope = self.growth.ln();
         self.refinements
@@ -46,8 +52,8 @@ impl Sizing {
             .fold(self.size, f64::min)
     }
 
-    /// Mesh lines along an axis: through all demanded coordinates, cells in between as large as
-    /// the sizing allows.
+    /// Mesh lines along an axis, m: they include all required coordinates, and the cells in between
+    /// are as large as the sizing allows.
     pub fn lines(&self, mut demanded: Vec<Line>) -> Result<Vec<f64>, TooClose> {
         demanded.sort_by(|a, b| a.at.total_cmp(&b.at));
         let span = demanded.last().map_or(0.0, |l| l.at) - demanded.first().map_or(0.0, |l| l.at);
@@ -76,9 +82,10 @@ impl Sizing {
         Ok(lines)
     }
 
-    /// From lip to lip. An even number of cells puts a line in the middle of the gap: in a column
-    /// of cells across the axis of a symmetric jet, splits and merges of particles know no
-    /// symmetry, and the jet of the silo leant over by 0.8 apertures at 0.6 ms.
+    /// Whether `a` and `b` are both refined, as the two edges of an aperture are. Such a gap gets
+    /// an even number of cells, so that a line lies in its middle: in a column of cells across the
+    /// axis of a symmetric jet, splitting and merging of particles is not symmetric, and the jet of
+    /// the silo was deflected by 0.8 apertures at 0.6 ms.
     fn is_gap(&self, a: f64, b: f64, span: f64) -> bool {
         let refined = |x: f64| {
             self.refinements.iter().any(|r| r.factor > 1.0 && (r.at - x).abs() <= 1e-9 * span)
@@ -87,13 +94,14 @@ impl Sizing {
     }
 
     fn is_uniform_between(&self, a: f64, b: f64) -> bool {
-        // The size is concave between refinements, so ends and refinements inside decide.
+        // The size is concave between refinements, so testing the ends and the refinements
+        // suffices.
         self.at(a) >= self.size
             && self.at(b) >= self.size
             && !self.refinements.iter().any(|r| r.at > a && r.at < b)
     }
 
-    /// `integral dx / size`
+    /// Number of cells between two coordinates, `integral dx / size`.
     fn cells_between(&self, a: f64, b: f64) -> f64 {
         if self.is_uniform_between(a, b) {
             (b - a) / self.size
@@ -114,7 +122,8 @@ impl Sizing {
         out
     }
 
-    /// Appends `n` cells' upper lines from `a` to `b`, equally spaced in `integral dx / size`.
+    /// Appends the upper lines of `n` cells from `a` to `b`, equally spaced in
+    /// `integral dx / size`.
     fn fill(&self, a: f64, b: f64, n: usize, lines: &mut Vec<f64>) {
         if self.is_uniform_between(a, b) {
             lines.extend((1..n).map(|i| a + (b - a) * i as f64 / n as f64));
@@ -131,7 +140,7 @@ impl Sizing {
     }
 }
 
-/// Samples of the cell size between two demanded lines.
+/// Number of samples of the cell size between two required lines.
 const SAMPLES: usize = 4096;
 
 #[cfg(test)]
@@ -169,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_between_lips_has_a_line_in_its_middle() {
+    fn an_aperture_has_a_line_in_its_middle() {
         let lip = |at| Refinement { at, factor: 3.0 };
         for size in [0.1, 0.15, 0.2, 0.3] {
             let s = Sizing { size, refinements: vec![lip(-0.5), lip(0.5)], growth: 1.6 };

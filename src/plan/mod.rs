@@ -1,13 +1,15 @@
-//! From what a scene says to what will be solved, and why.
+//! This module turns a scene into a [`Plan`], which states what will be solved, and why.
 //!
-//! A [`Plan`] is made once; every check and every default happens on the way to it, and after it
-//! nobody asks whether an option is set: an effect that the scene does not call for is absent
-//! (`None`, an empty list), not switched off by a zero. Everything numerical in a plan is in the
-//! plan's own [`Units`].
+//! A plan is made once. All checks and defaults are applied while it is made, so later code does
+//! not test whether an option is set: an effect that the scene does not need is absent (`None`, an
+//! empty list) instead of being switched off by a zero. Numbers in a plan are in the plan's own
+//! [`Units`], except where SI units are stated.
 
 pub mod boundary;
 mod change;
+mod difference;
 mod effects;
+pub mod loads;
 pub mod material;
 pub mod memory;
 mod meshing;
@@ -17,52 +19,73 @@ mod warning;
 
 pub use boundary::{BoundaryPlan, Side, WallLine};
 pub use effects::{Effect, EffectKind, EffectList, StepTime};
-pub use resolve::{MAX_MATERIALS, resolve};
+pub use resolve::resolve;
 pub use units::Units;
 pub use warning::Warning;
 
 use crate::scene::{ColourBy, FieldFn, FieldName, Integrator, Quadrature, Scene};
 use crate::space::mesh::Mesh;
 use crate::space::seeding::Seeding;
+use crate::space::segment::Segment;
 use crate::space::walls::Enclosure;
 use material::Material;
 use std::sync::Arc;
 
-/// Everything a run needs, checked and decided.
+/// Largest number of materials in a scene.
+pub const MAX_MATERIALS: usize = 16;
+
+/// All data that a run needs, checked and with defaults applied.
 #[derive(Clone, Debug)]
 pub struct Plan {
+    /// The scene as read.
     pub scene: Scene,
+    /// Units of the plan.
     pub units: Units,
+    /// The mesh.
     pub mesh: Arc<Mesh>,
+    /// Walls as obstacles, and the sides through which particles leave.
     pub enclosure: Enclosure,
+    /// Boundary conditions.
     pub boundary: BoundaryPlan,
+    /// Materials and gravity at the start.
     pub state: Matter,
-    /// `state` from given times or steps on, ascending.
+    /// Changes of `state` at given times or steps, in ascending order.
     pub changes: Vec<PlannedChange>,
+    /// Regions that are filled with materials at the start, in order.
     pub regions: Vec<Region>,
-    /// Initial fields of materials that carry their own viscosity or density, SI.
+    /// Initial fields of carried viscosity and density, one entry per material, SI.
     pub initial: Vec<InitialFields>,
-    /// Force and couple per volume fixed in space, SI.
+    /// Force along x and y (N/m3) and couple (N m/m3) per volume, fixed in space, SI.
     pub body_force: Option<[FieldFn; 3]>,
-    /// Acceleration fixed in space, SI; acts on the density.
+    /// Acceleration along x and y, fixed in space (m/s2), SI; it acts on the density.
     pub acceleration: Option<[FieldFn; 2]>,
+    /// Gauges.
     pub gauges: Vec<Gauge>,
+    /// Dye lines.
     pub tracers: Option<Tracers>,
+    /// Segments whose particles are marked at the start.
     pub marks: Vec<Mark>,
+    /// Settings that determine the accuracy.
     pub method: Method,
+    /// Settings of the time stepping.
     pub clock: ClockPlan,
+    /// Contents of the recording.
     pub picture: Picture,
+    /// Effects that are solved.
     pub effects: EffectSet,
+    /// Warnings about the scene.
     pub warnings: Vec<Warning>,
 }
 
-/// What may change while a run goes on.
+/// Materials and gravity: the values that may change during a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matter {
+    /// Materials, in the order of their indices.
     pub materials: Vec<Material>,
+    /// Gravitational acceleration along x and y, in the plan's units.
     pub gravity: [f64; 2],
-    /// Largest step that leaves a stratified scene at rest where it is; `None` where nothing could
-    /// restore anything.
+    /// Largest time step that keeps a stratified scene at rest, in the plan's units; `None` without
+    /// gravity or with a single density.
     pub relaxation: Option<f64>,
 }
 
@@ -74,54 +97,79 @@ impl Matter {
     }
 }
 
-/// A change of matter.
+/// A scheduled change of materials and gravity.
 #[derive(Clone, Debug)]
 pub struct PlannedChange {
+    /// Time or step of the change.
     pub when: When,
+    /// Materials and gravity after the change.
     pub state: Matter,
-    /// For the log.
+    /// Description of the change for the log.
     pub label: String,
 }
 
-/// When a change takes effect: with the solution at this time, or of this step.
+/// Instant at which a change takes effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum When {
+    /// With the solution at this time, in the plan's units.
     Time(f64),
+    /// With the solution of this step.
     Step(u64),
 }
 
-/// Which unknowns, columns and stages exist.
+/// Effects that are solved: they decide which unknowns, particle columns and stages exist.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EffectSet {
-    /// Cosserat rotation is an unknown.
+    /// The Cosserat rotation is an unknown.
     pub rotation: bool,
     /// Particles carry directors.
     pub directors: bool,
+    /// Particles carry their own viscosity.
     pub carried_viscosity: bool,
+    /// Particles carry their own density.
     pub carried_density: bool,
     /// Particle volumes follow the flow (finite bulk viscosity).
     pub volume_change: bool,
+    /// Gravity acts on a material with density.
     pub gravity: bool,
 }
 
-/// A part of the domain and the material that fills it at first (SI shapes).
+/// A part of the domain (SI coordinates) and the material that fills it at the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
+    /// Index of the material.
     pub material: u8,
+    /// Shape of the region.
     pub shape: Area,
+    /// Initial directors of a layered material.
     pub director: Option<InitialDirector>,
 }
 
 /// A shape in SI coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Area {
+    /// The whole domain.
     Everywhere,
-    Rectangle { x: [f64; 2], y: [f64; 2] },
-    Circle { centre: [f64; 2], radius: f64 },
+    /// An axis-aligned rectangle.
+    Rectangle {
+        /// Lower and upper end along x, m.
+        x: [f64; 2],
+        /// Lower and upper end along y, m.
+        y: [f64; 2],
+    },
+    /// A circle.
+    Circle {
+        /// Coordinates of the centre, m.
+        centre: [f64; 2],
+        /// Radius, m.
+        radius: f64,
+    },
+    /// The points where the function is above zero.
     Where(FieldFn),
 }
 
 impl Area {
+    /// Whether the area contains a point (SI coordinates).
     pub fn contains(&self, [px, py]: [f64; 2]) -> bool {
         match self {
             Area::Everywhere => true,
@@ -134,100 +182,120 @@ impl Area {
     }
 }
 
-/// Directors at the start.
+/// Initial directors of a layered material.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InitialDirector {
-    /// Degrees, SI coordinates.
+    /// Angle between the director and the x axis, degrees, as a function of SI coordinates.
     Angle(FieldFn),
+    /// Random directions.
     Random,
 }
 
-/// Fields of one material at the start, SI values and coordinates.
+/// Initial fields of one material, as functions of SI coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitialFields {
+    /// Shear viscosity carried by the particles, Pa s.
     pub viscosity: Option<FieldFn>,
+    /// Density carried by the particles, kg/m3.
     pub density: Option<FieldFn>,
 }
 
-/// A segment along a mesh line that counts a material.
+/// A segment that measures the volume of a material that crosses it, in the plan's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gauge {
+    /// Name of the gauge.
     pub name: String,
-    /// 0: the segment is vertical (normal along x); 1: horizontal.
-    pub normal: usize,
-    pub at: f64,
-    pub from: f64,
-    pub to: f64,
-    /// +1 or -1 along the normal.
+    /// The segment; it lies on mesh lines.
+    pub segment: Segment,
+    /// +1 if crossing along the normal counts as positive, otherwise -1.
     pub sign: f64,
+    /// Index of the material that is measured.
     pub material: u8,
 }
 
-/// Passive lines, in the plan's units.
+/// Dye lines at the start, in the plan's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracers {
+    /// Points of each line.
     pub lines: Vec<Vec<[f64; 2]>>,
-    /// Points of a line come no farther apart than this.
+    /// Largest distance between neighbouring points of a line.
     pub spacing: f64,
 }
 
-/// A segment whose particles are drawn in another colour.
+/// A segment whose particles are drawn in another colour, in the plan's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
+    /// One end.
     pub from: [f64; 2],
+    /// The other end.
     pub to: [f64; 2],
+    /// Largest distance of marked particles from the segment.
     pub half_width: f64,
 }
 
-/// Settings that buy accuracy.
+/// Settings that determine the accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
+    /// Number and positions of the particles at the start.
     pub seeding: Seeding,
+    /// Quadrature in cells.
     pub quadrature: Quadrature,
+    /// Time integration scheme.
     pub integrator: Integrator,
-    /// Share of the next step by which restoring loads are taken ahead while there is more than one
-    /// density; `None` without gravity, or where it was switched off.
+    /// Fraction of the next step by which restoring loads are evaluated ahead while there is more
+    /// than one density; `None` without gravity or if it is switched off.
     pub stabilisation: Option<f64>,
+    /// Tolerance of the solver for the relative residual and the relative divergence.
     pub tolerance: f64,
+    /// Largest number of corrections (iterations) of the solver.
     pub max_corrections: u32,
 }
 
 /// Time stepping, in the plan's units.
 #[derive(Clone, Debug)]
 pub struct ClockPlan {
+    /// End time.
     pub end: f64,
+    /// Largest time step.
     pub max_step: Option<f64>,
+    /// Largest number of cells that a particle crosses in a step (Courant number).
     pub courant: f64,
+    /// Largest strain of layered material in a step.
     pub strain: f64,
-    /// Times met exactly: frames and changes, ascending, the end included.
+    /// Times that a step ends at exactly: frames, changes and the end, in ascending order.
     pub stops: Vec<f64>,
-    /// Times of frames, ascending.
+    /// Times of frames, in ascending order.
     pub frames: Vec<f64>,
 }
 
-/// What the recording shows.
+/// Contents and appearance of the recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
+    /// Quantity that colours the particles.
     pub colour_by: ColourBy,
+    /// Largest number of particles per frame.
     pub max_particles: usize,
+    /// Fields written on a grid in each frame.
     pub fields: Vec<FieldName>,
+    /// Number of director strokes across the width of the domain.
     pub glyphs: u32,
-    /// Of the materials, then of marked particles.
+    /// Colours (sRGB) of the materials, followed by the colour of marked particles.
     pub colours: Vec<[u8; 3]>,
 }
 
 impl Plan {
-    /// Unknowns per node: 2, or 3 with rotation.
+    /// Number of unknowns per node: 2, or 3 with rotation.
     pub fn unknowns_per_node(&self) -> usize {
         if self.effects.rotation { 3 } else { 2 }
     }
 
-    /// Index of the material that fills what regions leave free.
+    /// Index of the background material, which fills the part of the domain outside all regions.
     pub fn background(&self) -> Option<u8> {
         self.state.materials.iter().position(|m| m.background).map(|m| m as u8)
     }
 
-    /// Whether a frame is due at a time (s), given how many were; counts on.
+    /// Whether a frame is due at the given time, s. `count` is the number of frames up to the last
+    /// call, and is updated.
     pub fn frame_is_due(&self, time: f64, count: &mut usize) -> bool {
         let now = time / self.units.time * (1.0 + 1e-12);
         let past = self.clock.frames.iter().take_while(|&&t| t <= now).count();
@@ -236,7 +304,7 @@ impl Plan {
         due
     }
 
-    /// SI coordinates of a point.
+    /// SI coordinates, m, of a point given in the plan's units.
     pub fn si(&self, p: [f64; 2]) -> [f64; 2] {
         p.map(|c| c * self.units.length)
     }

@@ -1,32 +1,71 @@
-//! What is allowed but worth knowing, with remedies.
+//! This module defines warnings about a scene or a run, with remedies.
 
 use std::fmt;
 
-/// A warning; the text says what to do about it.
+/// A warning; its text includes the remedy.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// Inertia would matter for these numbers, and is not solved.
-    Inertia { reynolds: f64 },
-    /// A dense fluid in one that is far thinner.
-    ThinFluid { dense: String, thin: String, ratio: f64 },
-    /// Layers that resist shear more than the matrix.
-    StiffLayers { material: String, ratio: f64 },
-    /// A coupling viscosity without an internal length, or the other way round.
-    NoInternalLength { material: String },
-    /// A rotation is prescribed but no material has one.
-    RotationUnused { place: String },
-    /// Directors given for a material that has no layers.
-    DirectorUnused { material: String },
-    /// A material that fills nothing.
-    MaterialUnused { material: String },
-    /// More particles than are written per frame.
-    ParticlesThinned { every: usize },
-    /// Dye lines stopped being refined.
-    DyeCoarse { points: usize },
-    /// Cells that had lost all particles were refilled.
-    CellsHealed { count: u64 },
-    /// A side has a given velocity through it.
-    ThroughFlow { place: String },
+    /// Inertia would matter for this Reynolds number but is not solved.
+    Inertia {
+        /// Reynolds number.
+        reynolds: f64,
+    },
+    /// A dense fluid lies in a lighter one that is far less viscous.
+    ThinFluid {
+        /// Name of the denser material.
+        dense: String,
+        /// Name of the less viscous material.
+        thin: String,
+        /// Ratio of the viscosities.
+        ratio: f64,
+    },
+    /// The layer viscosity exceeds the shear viscosity.
+    StiffLayers {
+        /// Name of the material.
+        material: String,
+        /// Layer viscosity over shear viscosity.
+        ratio: f64,
+    },
+    /// A material has a coupling viscosity but no internal length, or the other way round.
+    NoInternalLength {
+        /// Name of the material.
+        material: String,
+    },
+    /// A rotation is prescribed, but no material has a rotation.
+    RotationUnused {
+        /// Side of the domain, as its key in the scene.
+        place: String,
+    },
+    /// Directors are given for a material that is not layered.
+    DirectorUnused {
+        /// Name of the material.
+        material: String,
+    },
+    /// A material fills no part of the domain.
+    MaterialUnused {
+        /// Name of the material.
+        material: String,
+    },
+    /// There are more particles than are written per frame.
+    ParticlesThinned {
+        /// Interval of the particles that are written.
+        every: usize,
+    },
+    /// Dye lines are no longer refined.
+    DyeCoarse {
+        /// Number of points at which refinement stopped.
+        points: usize,
+    },
+    /// Cells that had lost all their particles were refilled.
+    CellsHealed {
+        /// Number of cells.
+        count: u64,
+    },
+    /// A side has a prescribed velocity through it.
+    ThroughFlow {
+        /// Side of the domain, as its key in the scene.
+        place: String,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -39,9 +78,9 @@ impl fmt::Display for Warning {
             ),
             Warning::ThinFluid { dense, thin, ratio } => write!(
                 f,
-                "`{dense}` is {ratio:.0e} times as viscous as the lighter `{thin}`: drops of it that \
-                 come loose fall far faster than it flows, and steps become as short; with a \
-                 ratio of 1e3 or 1e4 it flows much alike"
+                "`{dense}` is {ratio:.0e} times as viscous as the lighter `{thin}`: detached \
+                 drops of it fall much faster than it flows, and time steps become short \
+                 accordingly; a ratio of 1e3 or 1e4 gives a similar flow"
             ),
             Warning::StiffLayers { material, ratio } => write!(
                 f,
@@ -60,7 +99,7 @@ impl fmt::Display for Warning {
             ),
             Warning::DirectorUnused { material } => write!(
                 f,
-                "directors are given for `{material}`, whose layers make no difference: ignored; \
+                "directors are given for `{material}`, whose layers have no effect: ignored; \
                  give it a layer_viscosity other than its shear_viscosity"
             ),
             Warning::MaterialUnused { material } => {
@@ -85,9 +124,9 @@ impl fmt::Display for Warning {
             ),
             Warning::ThroughFlow { place } => write!(
                 f,
-                "{place} prescribes a velocity through it: particles leave with the flow, but what \
-                 flows in brings none, and those near it are split to fill in; read long runs \
-                 with care, or use periodic sides"
+                "{place} prescribes a velocity through it: particles leave with the outflow, but no \
+                 particles enter with the inflow, where nearby ones are split instead; interpret \
+                 long runs with care, or use periodic sides"
             ),
         }
     }

@@ -1,4 +1,5 @@
-//! Checkpoints: the state of a run in a file that is whole or refused.
+//! This module writes and reads checkpoints: files with the complete state of a run. A damaged file
+//! is rejected.
 //!
 //! ```text
 //! "grainscope state"   16 bytes
@@ -8,8 +9,9 @@
 //! each: kind u8, length of the name u16, name, number of values u64, values
 //! SHA-256 of everything above              32 bytes
 //! ```
-//! Numbers are little-endian, floats by their bits. A file is written beside its place, brought to
-//! the disk and renamed, so that a checkpoint is there or is not. The last [`KEPT`] stay.
+//! Numbers are little-endian; floats are stored bit for bit. A file is written under a temporary
+//! name, flushed to the disk and then renamed, so an incomplete checkpoint never appears under its
+//! final name. The last [`KEPT`] checkpoints are kept.
 
 use crate::sim::state::{Column, State};
 use sha2::{Digest, Sha256};
@@ -17,13 +19,13 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Version of the format; columns may be added without a new one.
+/// Version of the format. New columns do not need a new version.
 pub const FORMAT: u32 = 1;
 
-/// Checkpoints that are kept.
+/// Number of checkpoints that are kept.
 pub const KEPT: usize = 2;
 
-/// Folder of the checkpoints in that of a run.
+/// Name of the checkpoint folder inside the folder of a run.
 pub const FOLDER: &str = "checkpoints";
 
 const MAGIC: &[u8; 16] = b"grainscope state";
@@ -32,33 +34,53 @@ const CHECKSUM: usize = 32;
 const PREFIX: &str = "step-";
 const SUFFIX: &str = ".state";
 
-/// Why a checkpoint cannot be used.
+/// Error of writing or reading a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
+    /// The file cannot be written.
     #[error("{}: cannot be written: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    Write {
+        /// Path of the checkpoint.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The file cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
-    Read { path: PathBuf, source: std::io::Error },
+    Read {
+        /// Path of the checkpoint.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The content is not a valid checkpoint of the scene.
     #[error("{}: {source}", path.display())]
-    Refused { path: PathBuf, source: Refusal },
+    Refused {
+        /// Path of the checkpoint.
+        path: PathBuf,
+        /// Reason of the rejection.
+        source: Refusal,
+    },
 }
 
-/// What is wrong with the bytes of a checkpoint.
+/// Reason for which the content of a checkpoint is rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
-    #[error("is no checkpoint of grainscope")]
+    /// The file is not a checkpoint.
+    #[error("is not a checkpoint of grainscope")]
     Foreign,
-    #[error("is damaged: its checksum is not that of its content; it was cut or changed")]
+    /// The checksum does not match the content.
+    #[error("is damaged: its checksum does not match its content; it was truncated or changed")]
     Damaged,
-    #[error(
-        "is of format {0}, and this program reads format {FORMAT}; resume with its own version"
-    )]
+    /// The format has another version.
+    #[error("has format {0}, this program reads format {FORMAT}; use the version that wrote it")]
     Version(u32),
+    /// The checkpoint belongs to another scene.
     #[error("belongs to another scene than scene.toml, which may have been edited since")]
     Scene,
 }
 
-/// The bytes of a checkpoint.
+/// Encodes a state as the bytes of a checkpoint.
 pub fn encode(state: &State, scene_hash: &str) -> Vec<u8> {
     let mut out = Vec::new();
     out.extend(MAGIC);
@@ -86,14 +108,14 @@ pub fn encode(state: &State, scene_hash: &str) -> Vec<u8> {
     sealed(out)
 }
 
-/// Content with its checksum.
+/// Appends the checksum to the content.
 pub fn sealed(mut content: Vec<u8>) -> Vec<u8> {
     let checksum = Sha256::digest(&content);
     content.extend(checksum);
     content
 }
 
-/// The state in the bytes of a checkpoint of the scene with this hash.
+/// Decodes the bytes of a checkpoint of the scene with this hash.
 pub fn decode(bytes: &[u8], scene_hash: &str) -> Result<State, Refusal> {
     if !bytes.starts_with(MAGIC) {
         return Err(Refusal::Foreign);
@@ -130,7 +152,7 @@ pub fn decode(bytes: &[u8], scene_hash: &str) -> Result<State, Refusal> {
     if reader.0.is_empty() { Ok(state) } else { Err(Refusal::Damaged) }
 }
 
-/// What is left of the bytes.
+/// Reader of the remaining bytes.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -157,7 +179,7 @@ fn path_of(folder: &Path, step: u64) -> PathBuf {
     folder.join(FOLDER).join(format!("{PREFIX}{step:010}{SUFFIX}"))
 }
 
-/// Checkpoints in the folder of a run, the newest first.
+/// Steps and paths of the checkpoints in the folder of a run, newest first.
 pub fn list(folder: &Path) -> Vec<(u64, PathBuf)> {
     let entries = std::fs::read_dir(folder.join(FOLDER)).into_iter().flatten().flatten();
     let mut all: Vec<(u64, PathBuf)> = entries
@@ -171,8 +193,7 @@ pub fn list(folder: &Path) -> Vec<(u64, PathBuf)> {
     all
 }
 
-/// Writes the checkpoint of a step: to the disk, and only then to its place. Older ones than the
-/// last [`KEPT`] go.
+/// Writes the checkpoint of a step, and removes all but the last [`KEPT`] ones.
 pub fn write(
     folder: &Path,
     step: u64,
@@ -183,17 +204,17 @@ pub fn write(
     let within = folder.join(FOLDER);
     replace(&within, &path, &encode(state, scene_hash))
         .map_err(|source| CheckpointError::Write { path: path.clone(), source })?;
-    // A run that was taken up again from before has left these behind; they are of no use now.
+    // Later checkpoints remain from a run that was resumed from an earlier step; they are obsolete.
     let (later, kept): (Vec<_>, Vec<_>) = list(folder).into_iter().partition(|c| c.0 > step);
     for (_, old) in later.iter().chain(kept.iter().skip(KEPT)) {
-        // What cannot be removed is in nobody's way.
+        // A file that cannot be removed does no harm.
         let _ = std::fs::remove_file(old);
     }
     Ok(path)
 }
 
 fn replace(within: &Path, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    // The run's own folder is not made anew: where it is gone, so is the rest of the run.
+    // The folder of the run is not created again: if it is gone, so is the rest of the run.
     match std::fs::create_dir(within) {
         Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => return Err(e),
         _ => {}
@@ -210,7 +231,7 @@ fn replace(within: &Path, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     sync_folder(within)
 }
 
-/// Brings the names in a folder to the disk.
+/// Flushes the entries of a folder to the disk.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> std::io::Result<()> {
     File::open(folder)?.sync_all()
@@ -246,7 +267,7 @@ mod tests {
     const HASH: &str = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
 
     #[test]
-    fn what_is_written_is_read_to_the_bit() {
+    fn a_checkpoint_is_read_back_bit_for_bit() {
         let bytes = encode(&state(), HASH);
         let back = decode(&bytes, HASH).expect("whole");
         assert_eq!(encode(&back, HASH), bytes);
@@ -271,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn another_version_and_another_scene_are_named() {
+    fn other_versions_and_scenes_are_rejected() {
         let mut bytes = encode(&state(), HASH);
         assert_eq!(decode(&bytes, &HASH.replace('0', "1")), Err(Refusal::Scene));
         bytes[MAGIC.len()] = 7;
@@ -283,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_two_stay_and_nothing_half_written() {
+    fn only_the_last_two_checkpoints_are_kept() {
         let folder = TempFolder::new().expect("a folder");
         for step in [10, 20, 30] {
             write(folder.path(), step, &state(), HASH).expect("written");
@@ -292,7 +313,7 @@ mod tests {
         assert_eq!(steps, [30, 20]);
         write(folder.path(), 25, &state(), HASH).expect("written");
         let steps: Vec<u64> = list(folder.path()).iter().map(|c| c.0).collect();
-        assert_eq!(steps, [25, 20], "what came later belongs to a run that was left");
+        assert_eq!(steps, [25, 20], "later checkpoints are obsolete");
         let all = std::fs::read_dir(folder.path().join(FOLDER)).expect("a folder").count();
         assert_eq!(all, 2);
     }

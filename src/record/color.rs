@@ -1,17 +1,17 @@
-//! Colours of numbers and of curves, safe for colour-blind eyes.
+//! This module maps numbers and curves to colours that colour-blind readers can distinguish.
 
-/// Red, green, blue, opacity.
+/// Red, green, blue and opacity, each 0 to 255.
 pub type Rgba = [u8; 4];
 
-/// Behind the flow and the fields: light, so that dark walls stand out.
+/// Background colour of the flow and the fields. It is light so that dark walls stand out.
 pub const PAPER: [u8; 3] = [245, 245, 242];
 
-/// What stands for "no value" in an image: the paper behind it.
+/// Colour of pixels without a value: that of the background, [`PAPER`].
 ///
-/// Rerun draws images as if they were opaque, and transparent texels black.
+/// Rerun draws images as opaque, and transparent pixels as black.
 pub const NOTHING: Rgba = [PAPER[0], PAPER[1], PAPER[2], 255];
 
-/// The palette of Okabe and Ito, without its yellow, which drowns on white.
+/// The palette of Okabe and Ito without its yellow, which has too little contrast on white.
 pub const OKABE_ITO: [[u8; 3]; 7] = [
     [0, 114, 178],
     [213, 94, 0],
@@ -59,8 +59,8 @@ const VIRIDIS: [[u8; 3]; 33] = [
     [253, 231, 37],
 ];
 
-/// Blue, white, rust: seven anchors interpolated in Oklab, so that lightness
-/// falls evenly from the middle to both ends (0.98 to 0.30 and 0.32).
+/// A diverging scale from blue over white to rust, interpolated in Oklab between seven anchors:
+/// lightness falls evenly from the middle to both ends (0.98 to 0.30 and 0.32).
 const BLUE_WHITE_RUST: [[u8; 3]; 17] = [
     [11, 42, 91],
     [23, 70, 124],
@@ -81,7 +81,7 @@ const BLUE_WHITE_RUST: [[u8; 3]; 17] = [
     [95, 21, 10],
 ];
 
-/// How values become colours.
+/// Colour scale: maps values to colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColorScale {
     low: f32,
@@ -90,7 +90,7 @@ pub struct ColorScale {
 }
 
 impl ColorScale {
-    /// A scale over `range`; if `signed`, one about zero that spans it.
+    /// A scale over `range`; if `signed`, a scale symmetric about zero that contains `range`.
     pub fn new(range: [f32; 2], signed: bool) -> Self {
         let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
         let [low, high] = range.map(finite);
@@ -102,17 +102,17 @@ impl ColorScale {
         }
     }
 
-    /// The values at the two ends.
+    /// Values at the two ends of the scale.
     pub fn ends(&self) -> [f32; 2] {
         [self.low, self.high]
     }
 
-    /// Whether zero is white and sits in the middle.
+    /// Whether the scale is symmetric about zero, with white at zero.
     pub fn is_signed(&self) -> bool {
         self.signed
     }
 
-    /// The colour of one value: [`NOTHING`] for NaN, the nearer end beyond an end.
+    /// Colour of one value. NaN gives [`NOTHING`]; values outside the range give the nearer end.
     pub fn color(&self, value: f32) -> Rgba {
         if value.is_nan() {
             return NOTHING;
@@ -130,8 +130,8 @@ impl ColorScale {
         [r, g, b, 255]
     }
 
-    /// The colours of many values, as the bytes of an RGBA image: of 1024 steps from end to end, more
-    /// than eight bits can tell.
+    /// Colours of many values as the bytes of an RGBA image. They are quantised to 1024 steps,
+    /// finer than 8 bits per channel can show.
     pub fn image(&self, values: &[f32]) -> Vec<u8> {
         const STEPS: f32 = 1023.0;
         let span = self.high - self.low;
@@ -141,7 +141,7 @@ impl ColorScale {
         let per_value = if span > 0.0 { STEPS / span } else { 0.0 };
         let mut image = vec![0; 4 * values.len()];
         for (texel, &v) in image.as_chunks_mut().0.iter_mut().zip(values) {
-            // What is not a number is none of the palette; beyond an end is the end.
+            // NaN has no place in the palette; values outside the range are clamped.
             let place = ((v - self.low) * per_value + 0.5).clamp(0.0, STEPS);
             *texel = if v.is_nan() { NOTHING } else { palette[place as usize] };
         }
@@ -149,7 +149,7 @@ impl ColorScale {
     }
 }
 
-/// Interpolates in a table at `place` in [0, 1].
+/// Interpolates linearly in a table; `place` is in [0, 1].
 fn lookup(table: &[[u8; 3]], place: f32) -> [u8; 3] {
     let x = place * (table.len() - 1) as f32;
     let i = (x as usize).min(table.len() - 2);
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ends_middle_and_nothing() {
+    fn ends_middle_and_nan() {
         let plain = ColorScale::new([2.0, 4.0], false);
         assert_eq!(plain.color(2.0), [68, 1, 84, 255]);
         assert_eq!(plain.color(9.0), [253, 231, 37, 255]);

@@ -1,17 +1,24 @@
-//! The folder of a run.
+//! This module creates and checks the output folder of a run.
 
 use std::path::{Path, PathBuf};
 
-/// Why a run has no folder.
+/// Error of creating the folder of a run.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
+    /// The folder holds files of another run.
     #[error("the folder {} already holds a run; --force overwrites it", .0.display())]
     Taken(PathBuf),
+    /// The folder cannot be written.
     #[error("the folder {} cannot be written: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    Write {
+        /// Path of the folder.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
 }
 
-/// Files that a run writes; `--force` removes these and nothing else.
+/// Files that a run writes. `--force` removes these and the checkpoints, and nothing else.
 pub const FILES: [&str; 10] = [
     "recording.rrd",
     "series.csv",
@@ -25,11 +32,11 @@ pub const FILES: [&str; 10] = [
     "alignment.png",
 ];
 
-/// Most numbered siblings tried before giving up.
+/// Upper bound of the number that is appended to a taken name.
 const MOST: u32 = 100_000;
 
-/// Makes the folder of a run: `out` as given, which must not hold a run unless `force`; else
-/// `runs/<name>`, or `runs/<name>-2`, `-3`, ... if taken.
+/// Creates the folder of a run: `out` if given, which must not hold a run unless `force` is set;
+/// otherwise `runs/<name>`, or `runs/<name>-2`, `-3`, ... if that is taken.
 pub fn create(name: &str, out: Option<&Path>, force: bool) -> Result<PathBuf, FolderError> {
     let runs = Path::new("runs");
     let wanted = out.map_or_else(|| runs.join(name), Path::to_path_buf);
@@ -42,7 +49,7 @@ pub fn create(name: &str, out: Option<&Path>, force: bool) -> Result<PathBuf, Fo
     create_below(runs, name)
 }
 
-/// Makes the folder of a run, `<parent>/<name>`, or `<name>-2`, `-3`, ... if taken.
+/// Creates the folder of a run: `<parent>/<name>`, or `<name>-2`, `-3`, ... if that is taken.
 pub fn create_below(parent: &Path, name: &str) -> Result<PathBuf, FolderError> {
     let wanted = parent.join(name);
     let numbered = (2..MOST).map(|k| parent.join(format!("{name}-{k}")));
@@ -50,9 +57,9 @@ pub fn create_below(parent: &Path, name: &str) -> Result<PathBuf, FolderError> {
     make(&free.ok_or(FolderError::Taken(wanted))?, false)
 }
 
-/// Takes back what a run that could not start has left: a recording, and the folder if empty.
+/// Removes the recording of a run that could not start, and its folder if it is then empty.
 pub fn abandon(folder: &Path) {
-    // Best effort: the fault that is being reported matters more.
+    // Errors are ignored: the error that is being reported matters more.
     let _ = std::fs::remove_file(folder.join("recording.rrd"));
     let _ = std::fs::remove_dir(folder);
 }
@@ -75,7 +82,7 @@ fn make(folder: &Path, force: bool) -> Result<PathBuf, FolderError> {
             std::fs::remove_file(path).map_err(fault)?;
         }
     }
-    // Find out now, not after an hour, whether files can be made here.
+    // Test now, not after an hour, whether files can be created here.
     let probe = folder.join(".grainscope-probe");
     std::fs::write(&probe, b"").map_err(fault)?;
     std::fs::remove_file(&probe).map_err(fault)?;

@@ -1,23 +1,22 @@
-//! What a recording says of a run as a whole, and the scalars of each step.
+//! This module derives the constant part of a recording, and the scalars of each step.
 
 use crate::frame::{
     Frame, Material, Outline, Picture, Plot, Quantity, Rect, RunInfo, Scalar, Series,
 };
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName, scene_hash, to_toml};
-use crate::sim::row::Row;
+use crate::sim::row::{Panel, Place, Row, places};
+use crate::space::segment::Segment;
 
-/// Name of the materials' last class: particles marked by dye.
+/// Name of the last class of materials: particles marked by dye.
 const MARKED: &str = "marked";
 
-/// The constant part of a recording of `plan` under the name `name`.
+/// The constant part of a recording of `plan`, under the name `name`.
 pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
     let f = |v: f64| (v * plan.units.length) as f32;
     let (x, y) = (&plan.mesh.x, &plan.mesh.y);
     let domain = Rect { min: [f(x.start()), f(y.start())], max: [f(x.end()), f(y.end())] };
-    let segment = |normal: usize, at: f64, from: f64, to: f64| {
-        [from, to].map(|v| if normal == 0 { [f(at), f(v)] } else { [f(v), f(at)] }).to_vec()
-    };
+    let ends = |s: &Segment| s.ends().map(|p| p.map(f)).to_vec();
     let [[x0, y0], [x1, y1]] = [domain.min, domain.max];
     let outlines = [
         ("left", [[x0, y0], [x0, y1]]),
@@ -42,7 +41,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
             .obstacles
             .iter()
             .zip(names)
-            .map(|(o, name)| Outline { name, points: segment(o.normal, o.at, o.from, o.to) }),
+            .map(|(o, name)| Outline { name, points: ends(o) }),
     );
     let undrawn = plan.background().map(|b| &plan.state.materials[b as usize].name);
     let materials: Vec<Material> = plan
@@ -65,10 +64,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         gauges: plan
             .gauges
             .iter()
-            .map(|g| Outline {
-                name: g.name.clone(),
-                points: segment(g.normal, g.at, g.from, g.to),
-            })
+            .map(|g| Outline { name: g.name.clone(), points: ends(&g.segment) })
             .collect(),
         materials,
         particle_radius: f(0.5 * sizes(x).min(sizes(y)) / side),
@@ -107,60 +103,30 @@ fn field_quantity(plan: &Plan, name: FieldName) -> Option<Quantity> {
     })
 }
 
+/// The panels of curves with the columns of a plan.
 fn plots(plan: &Plan) -> Vec<Plot> {
-    let mut list = Vec::new();
-    let plot = |title: &str, log10, series| Plot { title: title.into(), log10, series };
-    if !plan.gauges.is_empty() {
-        let of = |what: &str| {
-            plan.gauges
-                .iter()
-                .map(|g| Series::new(format!("gauges/{}/{what}", g.name), g.name.clone()))
-                .collect()
-        };
-        list.push(plot("Outflow volume (m²)", false, of("volume")));
-        list.push(plot("Outflow rate (m²/s)", false, of("rate")));
-    }
-    if plan.effects.directors {
-        list.push(plot(
-            "Mean alignment |n_x|",
-            false,
-            vec![Series::new("texture/alignment", "mean |n_x|")],
-        ));
-    }
-    if plan.gauges.is_empty() {
-        list.push(plot(
-            "Power (W/m)",
-            false,
-            vec![
-                Series::new("diagnostics/power_in", "loads"),
-                Series::new("diagnostics/dissipation", "dissipation"),
-            ],
-        ));
-    }
-    list.push(plot(
-        "Balances (log10)",
-        true,
-        vec![
-            Series::new("diagnostics/power_error", "power error"),
-            Series::new("diagnostics/divergence_error", "divergence error"),
-            Series::new("diagnostics/volume_error", "volume error"),
-        ],
-    ));
-    list.push(plot(
-        "Seconds per step",
-        false,
-        vec![
-            Series::new("seconds/assemble", "assemble"),
-            Series::new("seconds/factor", "factor"),
-            Series::new("seconds/solve", "solve"),
-            Series::new("seconds/motion", "motion"),
-        ],
-    ));
-    list.push(plot("Time step (log10 s)", true, vec![Series::new("time/dt", "dt")]));
-    list
+    let places = places(plan);
+    let curves = |panel: Panel| -> Vec<Series> {
+        if panel == Panel::Seconds {
+            let shown = ["assemble", "factor", "solve", "motion"];
+            return shown.map(|name| Series::new(format!("seconds/{name}"), name)).to_vec();
+        }
+        // Powers are of little interest beside an outflow.
+        if panel == Panel::Power && !plan.gauges.is_empty() {
+            return vec![];
+        }
+        let of_panel = places.iter().filter(|p| p.column.panel == Some(panel));
+        of_panel.map(|p| Series::new(p.path.clone(), p.curve.clone())).collect()
+    };
+    let plot = |panel: Panel| {
+        let (title, log10) = panel.heading();
+        let series = curves(panel);
+        (!series.is_empty()).then(|| Plot { title: title.into(), log10, series })
+    };
+    Panel::ALL.into_iter().filter_map(plot).collect()
 }
 
-/// A frame of a row, with a picture on the steps that show one.
+/// The frame of a row, with a picture on the steps that have one.
 pub fn frame(
     plan: &Plan,
     row: &Row,
@@ -168,26 +134,19 @@ pub fn frame(
     picture: Option<Picture>,
     warnings: Vec<String>,
 ) -> Frame {
-    let mut scalars = vec![
-        Scalar::new("diagnostics/power_in", row.power_in),
-        Scalar::new("diagnostics/dissipation", row.dissipation),
-        Scalar::new("diagnostics/power_error", row.power_error),
-        Scalar::new("diagnostics/divergence_error", row.divergence_error),
-        Scalar::new("diagnostics/volume_error", row.volume_error),
-        Scalar::new("diagnostics/max_speed", row.max_speed),
-        Scalar::new("diagnostics/rms_speed", row.rms_speed),
-    ];
-    for (g, plan) in row.gauges.iter().zip(&plan.gauges) {
-        scalars.push(Scalar::new(format!("gauges/{}/volume", plan.name), g.volume));
-        scalars.push(Scalar::new(format!("gauges/{}/rate", plan.name), g.rate));
-    }
+    let recorded = |p: &Place| {
+        let known = match p.column.panel {
+            Some(Panel::TimeStep) => row.step > 0,
+            Some(Panel::Alignment) => row.mean_alignment.is_some(),
+            _ => true,
+        };
+        known && !p.path.is_empty()
+    };
+    let mut scalars: Vec<Scalar> = places(plan)
+        .into_iter()
+        .filter(recorded)
+        .map(|p| Scalar::new(p.path.clone(), p.number(row)))
+        .collect();
     scalars.extend(row.seconds.list().map(|(name, s)| Scalar::new(format!("seconds/{name}"), s)));
-    for (drift, material) in row.drift.iter().zip(&plan.state.materials) {
-        scalars.push(Scalar::new(format!("volume_drift/{}", material.name), *drift));
-    }
-    scalars.extend(row.alignment.map(|a| Scalar::new("texture/alignment", a)));
-    if row.step > 0 {
-        scalars.push(Scalar::new("time/dt", row.dt));
-    }
     Frame { step: row.step, time_s: row.time, wall_s, picture, scalars, warnings }
 }

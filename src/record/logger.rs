@@ -1,4 +1,4 @@
-//! The logger thread: frames arrive over a bounded channel, in order.
+//! This module runs the logger thread, which receives frames in order over a bounded channel.
 
 use super::rerun_log::{Finished, RecordError, RerunLog};
 use crate::frame::Frame;
@@ -8,25 +8,28 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Frames that may wait for the logger.
+/// Number of frames that may wait for the logger.
 const CAPACITY: usize = 8;
 
-/// What to do when the logger is behind.
+/// Behaviour when the logger falls behind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backpressure {
-    /// The simulation waits: nothing is lost. For recordings.
+    /// The simulation waits, and no frame is lost. Used for recordings.
     Wait,
-    /// The oldest waiting frame is dropped: the newest matters. For watching.
+    /// The oldest waiting frame is dropped. Used for live viewing, where the newest frame matters.
     DropOldest,
 }
 
-/// How often the two threads met.
+/// Counts of the frames passed to the logger.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traffic {
+    /// Frames sent.
     pub frames: u64,
+    /// Frames dropped.
     pub drops: u64,
-    /// Frames that had to wait, and how long in all.
+    /// Frames that had to wait.
     pub waits: u64,
+    /// Total waiting time.
     pub waited: Duration,
 }
 
@@ -34,27 +37,27 @@ pub struct Traffic {
 pub struct Logger {
     policy: Backpressure,
     sender: Sender<Item>,
-    /// The other end, to take the oldest frame out; only for [`Backpressure::DropOldest`], since
-    /// the channel never closes while it exists.
+    /// The receiving end, used to remove the oldest frame. It exists only for
+    /// [`Backpressure::DropOldest`], since the channel stays open as long as it exists.
     oldest: Option<Receiver<Item>>,
     thread: JoinHandle<Result<Finished, RecordError>>,
     busy_ns: Arc<AtomicU64>,
     traffic: Traffic,
 }
 
-/// What the thread is asked to do.
+/// Message to the logger thread.
 enum Item {
     Frame(Box<Frame>),
-    /// Bring everything so far to the disk, and say so.
+    /// Flush everything received so far to the disk, then reply.
     Settle(Sender<()>),
 }
 
-/// The logger ended early; [`Logger::finish`] says why.
+/// Error: the logger thread has ended early. [`Logger::finish`] returns the cause.
 #[derive(Debug)]
 pub struct LoggerGone;
 
 impl Traffic {
-    /// That of two parts of a run.
+    /// Sum of the counts of two parts of a run.
     pub fn and(self, o: Traffic) -> Traffic {
         Traffic {
             frames: self.frames + o.frames,
@@ -66,7 +69,7 @@ impl Traffic {
 }
 
 impl Logger {
-    /// Starts the thread on an open recording.
+    /// Starts the logger thread on an open recording.
     pub fn start(log: RerunLog, policy: Backpressure) -> std::io::Result<Logger> {
         let (sender, receiver) = bounded::<Item>(CAPACITY);
         let oldest = (policy == Backpressure::DropOldest).then(|| receiver.clone());
@@ -74,15 +77,15 @@ impl Logger {
         let busy = busy_ns.clone();
         let thread = std::thread::Builder::new().name("logger".into()).spawn(move || {
             let mut log = log;
-            // Ends when the sender is dropped. A fault ends it at once and closes the channel: the
-            // simulation hears of it with its next frame.
+            // The loop ends when the sender is dropped. An error ends it at once and closes the
+            // channel, which the simulation notices when it sends its next frame.
             for item in receiver {
                 let clock = Instant::now();
                 match item {
                     Item::Frame(frame) => log.frame(&frame)?,
                     Item::Settle(done) => {
                         log.settle()?;
-                        // Nobody waits any more if this fails.
+                        // If this fails, the receiver has gone and needs no reply.
                         let _ = done.send(());
                     }
                 }
@@ -93,6 +96,7 @@ impl Logger {
         Ok(Logger { policy, sender, oldest, thread, busy_ns, traffic: Traffic::default() })
     }
 
+    /// Sends a frame to the logger.
     pub fn send(&mut self, frame: Frame) -> Result<(), LoggerGone> {
         self.traffic.frames += 1;
         match self.sender.try_send(Item::Frame(Box::new(frame))) {
@@ -107,7 +111,7 @@ impl Logger {
                     sent
                 }
                 Backpressure::DropOldest => loop {
-                    // With the other end in our hands the channel stays open: ask the thread.
+                    // The channel stays open while we hold the receiver, so ask the thread.
                     if self.thread.is_finished() {
                         return Err(LoggerGone);
                     }
@@ -124,13 +128,13 @@ impl Logger {
         }
     }
 
-    /// How often the two threads have met so far, and how long this one was busy.
+    /// Counts so far, and the time that the logger was busy.
     pub fn traffic(&self) -> (Traffic, Duration) {
         (self.traffic, Duration::from_nanos(self.busy_ns.load(Ordering::Relaxed)))
     }
 
-    /// Waits until everything sent so far is on the disk. Where frames may be dropped nothing is kept
-    /// there.
+    /// Waits until everything sent so far is on the disk. With [`Backpressure::DropOldest`] nothing
+    /// is written to the disk, and it returns at once.
     pub fn settle(&mut self) -> Result<(), LoggerGone> {
         if self.policy == Backpressure::DropOldest {
             return Ok(());
@@ -140,7 +144,7 @@ impl Logger {
         settled.recv().map_err(|_| LoggerGone)
     }
 
-    /// Waits until everything is recorded.
+    /// Waits until everything is recorded. Returns the result, the counts and the busy time.
     pub fn finish(self) -> (Result<Finished, RecordError>, Traffic, Duration) {
         let Logger { sender, oldest, thread, busy_ns, traffic, .. } = self;
         drop(sender);

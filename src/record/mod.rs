@@ -1,4 +1,4 @@
-//! From frames to what people look at: the logger thread, recordings, tables and plots.
+//! This module writes the output of a run: recordings, checkpoints, tables, summaries and plots.
 
 pub mod checkpoint;
 pub mod color;

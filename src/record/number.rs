@@ -1,19 +1,19 @@
-//! Numbers as people read them.
+//! This module formats numbers for readers.
 
-/// The largest multiple of three not above the decimal exponent of `value`.
+/// Largest multiple of three not above the decimal exponent of `value`.
 ///
-/// Zero for zero and for what is not finite.
+/// It is zero for zero and for values that are not finite.
 pub fn engineering_exponent(value: f64) -> i32 {
     let magnitude = value.abs();
     if !magnitude.is_finite() || magnitude == 0.0 {
         return 0;
     }
-    // The tiny addend keeps 1e-3 and 1e3 from rounding into the decade below.
+    // The small addend keeps 1e-3 and 1e3 from being rounded into the decade below.
     let exponent = (magnitude.log10() + 1e-9).floor();
     3 * (exponent / 3.0).floor() as i32
 }
 
-/// Three significant digits, without trailing zeros: `0`, `12.5`, `3.4e-5`.
+/// Formats with three significant digits, without trailing zeros: `0`, `12.5`, `3.4e-5`.
 pub fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -31,7 +31,7 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// Drops zeros after the decimal point, and the point if nothing is left.
+/// Removes trailing zeros after the decimal point, and the point itself if no digit follows.
 pub fn trim_zeros(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }

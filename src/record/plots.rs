@@ -1,8 +1,8 @@
-//! Line plots on paper: the same figure as SVG and as PNG.
+//! This module draws line plots: the same figure as SVG and as PNG.
 //!
-//! Axes are drawn here rather than by plotters' chart builder, which places
-//! the legend upon the data, labels logarithms badly and knows no engineering
-//! notation. Nothing panics on empty, constant or infinite data.
+//! The axes are drawn here and not by the chart builder of plotters, which places the legend over
+//! the data, labels logarithms badly and has no engineering notation. Empty, constant or infinite
+//! data cause no panic.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -15,96 +15,97 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::color::OKABE_ITO;
 use super::number::{engineering_exponent, trim_zeros};
 
-/// Size of a figure (pixels); stacked panels share the height.
+/// Size of a figure with one plot (pixels).
 const SIZE: (u32, u32) = (1200, 750);
 
 /// Height of one panel of a stack (pixels).
 const PANEL_HEIGHT: u32 = 380;
 
-/// A PNG is drawn this much larger and averaged: plotters does not smooth
-/// thick lines itself.
+/// A PNG is drawn larger by this factor and averaged: plotters does not smooth thick lines.
 const OVERSAMPLING: u32 = 2;
 
-/// An SVG is drawn this much larger and shrunk by its view box: plotters
-/// rounds to whole pixels, which would leave steps in smooth curves.
+/// An SVG is drawn larger by this factor and scaled down by its view box: plotters rounds to whole
+/// pixels, which would leave steps in smooth curves.
 const SVG_GRAIN: u32 = 8;
 
-/// Curves with more points than this are thinned to their extremes per pixel.
+/// Curves with more points than this are reduced to their extremes per pixel column.
 const MOST_POINTS: usize = 5000;
 
+/// Name under which the built-in font is registered.
 pub(super) const FONT: &str = "sans-serif";
+/// Colour of text and frames.
 pub(super) const INK: RGBColor = RGBColor(34, 34, 38);
 const GRID: RGBColor = RGBColor(225, 225, 228);
 
-/// One axis.
+/// An axis of a plot.
 #[derive(Debug, Clone, Default)]
 pub struct Axis {
-    /// What it measures, such as `time`.
+    /// Name of the quantity, such as `time`.
     pub name: String,
-    /// Its unit, such as `s` or `m²/s`; empty for pure numbers.
+    /// Unit, such as `s` or `m²/s`; empty for pure numbers.
     pub unit: String,
-    /// Whether it is logarithmic. Values that are not positive are left out.
+    /// Whether the axis is logarithmic. Values that are not positive are then left out.
     pub log: bool,
 }
 
 impl Axis {
-    /// A linear axis.
+    /// A linear axis of a quantity `name` in `unit`.
     pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { name: name.into(), unit: unit.into(), log: false }
     }
 
-    /// The same axis, logarithmic.
+    /// The same axis with a logarithmic scale.
     pub fn log(self) -> Self {
         Self { log: true, ..self }
     }
 }
 
-/// One curve.
+/// A curve of a plot.
 #[derive(Debug, Clone, Default)]
 pub struct Curve {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: String,
-    /// Its points; a point that is not finite interrupts the line.
+    /// Points (x, y), in the units of the axes. A point that is not finite interrupts the line.
     pub points: Vec<(f64, f64)>,
-    /// Whether the points are marked.
+    /// Whether the points are drawn as dots.
     pub marks: bool,
 }
 
-/// A plot.
+/// A plot: title, axes and curves.
 #[derive(Debug, Clone, Default)]
 pub struct PlotSpec {
-    /// What it shows.
+    /// Title of the plot.
     pub title: String,
     /// The horizontal axis.
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// The curves, at best seven: then colours repeat.
+    /// Curves. Colours repeat after seven.
     pub curves: Vec<Curve>,
 }
 
-/// Why a plot was not written.
+/// Error of writing a plot.
 #[derive(Debug, thiserror::Error)]
 #[error("the plot {} cannot be written: {cause}", path.display())]
 pub struct PlotError {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What the system says.
+    /// Cause, as reported by the system or the encoder.
     pub cause: String,
 }
 
-/// Writes `<stem>.svg` and `<stem>.png`.
+/// Writes a plot to `<stem>.svg` and `<stem>.png`.
 pub fn line_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
     write(stem, &Panels::of(std::slice::from_ref(plot)), SIZE)
 }
 
-/// Writes `<stem>.svg` and `<stem>.png`; `bars` has, for each point of each curve, how far it may be
-/// off either way.
+/// Writes a plot with error bars to `<stem>.svg` and `<stem>.png`. `bars` has the half-length of
+/// the bar for each point of each curve, in the unit of y.
 pub fn spread_plot(stem: &Path, plot: &PlotSpec, bars: &[Vec<f64>]) -> Result<(), PlotError> {
     write(stem, &Panels { plots: std::slice::from_ref(plot), bars }, SIZE)
 }
 
-/// Writes `<stem>.svg` only.
+/// Writes a plot to `<stem>.svg` only.
 pub fn svg_plot(stem: &Path, plot: &PlotSpec) -> Result<(), PlotError> {
     let path = with_suffix(stem, ".svg");
     let panels = Panels::of(std::slice::from_ref(plot));
@@ -117,19 +118,20 @@ pub fn panels_plot(stem: &Path, plots: &[PlotSpec]) -> Result<(), PlotError> {
     write(stem, &Panels::of(plots), (SIZE.0, PANEL_HEIGHT * count))
 }
 
-/// Not `with_extension`: a stem such as `dt_0.01` has none to replace.
+/// Appends a suffix to a path. `with_extension` would replace part of a stem such as `dt_0.01`.
 fn with_suffix(stem: &Path, suffix: &str) -> PathBuf {
     let mut name = stem.as_os_str().to_owned();
     name.push(suffix);
     PathBuf::from(name)
 }
 
-/// A figure that any backend can draw.
+/// A figure that can be drawn on any backend.
 pub(super) trait Drawing {
+    /// Draws the figure.
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, pen: Pen) -> Drawn<B>;
 }
 
-/// Writes a figure of a size in pixels as `<stem>.svg` and `<stem>.png`.
+/// Writes a figure of `size` pixels as `<stem>.svg` and `<stem>.png`.
 pub(super) fn write(stem: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), PlotError> {
     let (svg, png) = (with_suffix(stem, ".svg"), with_suffix(stem, ".png"));
     to_svg(&svg, figure, size).map_err(|cause| PlotError { path: svg, cause })?;
@@ -146,7 +148,7 @@ fn to_svg(path: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), St
         figure.draw(&root, pen).map_err(|e| e.to_string())?;
         root.present().map_err(|e| e.to_string())?;
     }
-    // The view box, which follows, keeps the large size.
+    // The view box, which follows in the text, keeps the larger size.
     let text = text.replacen(
         &format!("width=\"{width}\" height=\"{height}\""),
         &format!("width=\"{}\" height=\"{}\"", size.0, size.1),
@@ -166,7 +168,7 @@ fn to_png(path: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), St
         root.present().map_err(|e| e.to_string())?;
     }
     let small = average(&pixels, size);
-    // Opened here first: the encoder's error does not name its cause.
+    // The file is opened here first because the error of the encoder does not name its cause.
     std::fs::File::create(path).map_err(|e| e.to_string())?;
     let root = BitMapBackend::new(path, size).into_drawing_area();
     let image = BitMapElement::with_owned_buffer((0, 0), size, small)
@@ -197,7 +199,7 @@ fn average(pixels: &[u8], (width, height): (u32, u32)) -> Vec<u8> {
     small
 }
 
-/// Registers the font that is part of the program, so that no other is needed.
+/// Registers the built-in font, so that no system font is needed.
 fn font() -> Result<(), String> {
     static FONT_IS_KNOWN: OnceLock<bool> = OnceLock::new();
     let known = FONT_IS_KNOWN.get_or_init(|| {
@@ -207,27 +209,31 @@ fn font() -> Result<(), String> {
     known.then_some(()).ok_or_else(|| "the built-in font is broken".to_owned())
 }
 
-/// How a backend draws.
+/// Scale and line style of a backend.
 #[derive(Clone, Copy)]
 pub(super) struct Pen {
     /// Pixels of the backend per pixel of the figure.
     pub(super) scale: f64,
-    /// Whether it joins thick lines well. Plotters' bitmaps do not: at sharp
-    /// turns their joints shoot out of the figure.
+    /// Whether the backend joins thick lines well. The bitmaps of plotters do not: at sharp turns
+    /// their joints extend far beyond the line.
     joins: bool,
 }
 
+/// Result of drawing on a backend.
 pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 impl Pen {
+    /// Converts pixels of the figure to pixels of the backend.
     pub(super) fn px(self, n: f64) -> i32 {
         (n * self.scale).round() as i32
     }
 
+    /// Style of a line of `width` pixels of the figure.
     pub(super) fn stroke(self, color: RGBColor, width: f64) -> ShapeStyle {
         color.stroke_width(self.px(width).max(1) as u32)
     }
 
+    /// Writes text of `size` pixels of the figure at a position of the backend.
     pub(super) fn text<B: DrawingBackend>(
         self,
         area: &DrawingArea<B, Shift>,
@@ -240,7 +246,7 @@ impl Pen {
         area.draw_text(text, &style.color(&INK).pos(pos), at)
     }
 
-    /// A line through points.
+    /// Draws a line through points.
     pub(super) fn polyline<B: DrawingBackend>(
         self,
         area: &DrawingArea<B, Shift>,
@@ -260,10 +266,10 @@ impl Pen {
     }
 }
 
-/// Plots, one below the other.
+/// Several plots, one below the other.
 struct Panels<'a> {
     plots: &'a [PlotSpec],
-    /// Of the points of the curves of a single plot.
+    /// Half-lengths of the error bars of each curve; used for a single plot only.
     bars: &'a [Vec<f64>],
 }
 
@@ -284,13 +290,14 @@ impl Drawing for Panels<'_> {
     }
 }
 
-/// An axis laid out for some data.
+/// An axis with its range and ticks, computed from the data.
 struct Scale {
-    /// Ends, in logarithms if `log`.
+    /// Lower end; its decimal logarithm if `log`.
     low: f64,
+    /// Upper end; its decimal logarithm if `log`.
     high: f64,
     log: bool,
-    /// Where ticks are, and what they say.
+    /// Positions and labels of the ticks.
     ticks: Vec<(f64, String)>,
     label: String,
 }
@@ -304,7 +311,7 @@ impl Scale {
                 Some(ends.map_or((value, value), |(l, h)| (l.min(value), h.max(value))))
             })?;
         if high - low <= 1e-12 * low.abs().max(high.abs()) {
-            // A constant is a line in the middle.
+            // A constant is drawn as a line in the middle.
             let room = match (axis.log, low == 0.0) {
                 (true, _) => 0.5,
                 (false, true) => 1.0,
@@ -323,7 +330,7 @@ impl Scale {
         let step = nice_step(high - low);
         let first = (low / step).ceil() as i64;
         let last = (high / step).floor() as i64;
-        // Numbers such as 0.2 or 1500 are read as they are; others are not.
+        // Numbers such as 0.2 or 1500 need no power of ten; others do.
         let reach = low.abs().max(high.abs());
         let exponent = if (0.1..1e4).contains(&reach) { 0 } else { engineering_exponent(reach) };
         let factor = 10f64.powi(exponent);
@@ -339,7 +346,7 @@ impl Scale {
     }
 
     fn logarithmic(axis: &Axis, low: f64, high: f64) -> Self {
-        // Less than half a decade of data is still shown on half a decade.
+        // The axis spans at least half a decade.
         let short = (0.5 - (high - low)).max(0.0) / 2.0;
         let (low, high) = (low - short, high + short);
         let span = high - low;
@@ -361,7 +368,7 @@ impl Scale {
         Self { low, high, log: true, ticks, label: axis_label(axis, 0) }
     }
 
-    /// Moves the ends out by a share of the span.
+    /// Extends both ends by `share` times the span.
     fn widen(mut self, share: f64) -> Self {
         let room = share * (self.high - self.low);
         self.low -= room;
@@ -369,7 +376,7 @@ impl Scale {
         self
     }
 
-    /// Where a value lies between the ends; `None` if it cannot be drawn.
+    /// Position of a value, 0 at the lower end and 1 at the upper; `None` if it cannot be drawn.
     fn place(&self, value: f64) -> Option<f64> {
         let value = if self.log { value.log10() } else { value };
         let place = (value - self.low) / (self.high - self.low);
@@ -381,7 +388,7 @@ impl Scale {
     }
 }
 
-/// The step among 1, 2, 5 times a power of ten that gives five to ten ticks.
+/// Tick spacing of 1, 2 or 5 times a power of ten that gives about five to ten ticks.
 fn nice_step(span: f64) -> f64 {
     let decade = 10f64.powf((span / 10.0).log10().floor());
     let share = span / 10.0 / decade;
@@ -394,7 +401,7 @@ fn nice_step(span: f64) -> f64 {
     (digit * decade).max(f64::MIN_POSITIVE)
 }
 
-/// A power of ten.
+/// Formats a power of ten.
 fn decade(exponent: i64) -> String {
     match exponent {
         -2..=3 => plain(1.0, exponent),
@@ -402,7 +409,7 @@ fn decade(exponent: i64) -> String {
     }
 }
 
-/// A digit times a power of ten.
+/// Formats a digit times a power of ten.
 fn plain(digit: f64, exponent: i64) -> String {
     let exponent = i32::try_from(exponent).unwrap_or(0);
     if (-3..=4).contains(&exponent) {
@@ -413,17 +420,17 @@ fn plain(digit: f64, exponent: i64) -> String {
     }
 }
 
-/// Name and unit, with the power of ten pulled out of the numbers.
+/// Label of an axis: name and unit, including the power of ten factored out of the tick labels.
 fn axis_label(axis: &Axis, exponent: i32) -> String {
     let Axis { name, unit, .. } = axis;
-    // Prefixes are for simple units: a millimetre squared is not 1e-3 m².
+    // Only simple units take prefixes: a millimetre squared is not 1e-3 m².
     let simple = matches!(unit.as_str(), "m" | "s" | "Pa" | "N" | "J" | "W" | "Hz");
     let prefix = match exponent {
         0 => Some(""),
         -9 => Some("n"),
         -6 => Some("µ"),
         -3 => Some("m"),
-        // Nobody counts in kiloseconds.
+        // Kiloseconds are not in use.
         3 if unit != "s" => Some("k"),
         6 if unit != "s" => Some("M"),
         9 if unit != "s" => Some("G"),
@@ -439,15 +446,15 @@ fn axis_label(axis: &Axis, exponent: i32) -> String {
     }
 }
 
-/// One plot and the part of the figure it fills.
+/// A plot and the part of the figure that it fills.
 struct Panel<'a, B: DrawingBackend> {
     area: &'a DrawingArea<B, Shift>,
     plot: &'a PlotSpec,
     bars: &'a [Vec<f64>],
     pen: Pen,
-    /// Left, top, right, bottom of the frame (pixels of the backend).
+    /// Left, top, right and bottom of the frame (pixels of the backend).
     frame: [i32; 4],
-    /// Rows of the legend: each curve and the width of its name.
+    /// Rows of the legend: index of each curve and width of its name (pixels of the backend).
     legend: Vec<Vec<(usize, i32)>>,
 }
 
@@ -474,7 +481,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         Self { area, plot, bars, pen, frame, legend }
     }
 
-    /// Names of several curves, in as many rows as they need. One curve needs none.
+    /// Arranges the curve names in as many rows as they need. A single curve has no legend.
     fn legend_rows(
         area: &DrawingArea<B, Shift>,
         plot: &PlotSpec,
@@ -503,7 +510,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         rows
     }
 
-    /// Room of a name in the legend besides the name: its line, and gaps.
+    /// Width of a legend entry besides the name: line sample and gaps (pixels of the backend).
     fn swatch(pen: Pen) -> i32 {
         pen.px(28.0) + pen.px(8.0) + pen.px(26.0)
     }
@@ -593,7 +600,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         self.area.draw_text(&y.label, &style, beside)
     }
 
-    /// Names of the curves, in rows above the frame.
+    /// Draws the legend in rows above the frame.
     fn legend(&self) -> Drawn<B> {
         let [left, _, right, _] = self.frame;
         let (line, gap, space) = (self.px(28.0), self.px(8.0), self.px(26.0));
@@ -613,7 +620,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         Ok(())
     }
 
-    /// Lower and upper ends of the bars of each curve, in turn.
+    /// Lower and upper ends of the bars of each curve, alternating.
     fn bar_ends(&self) -> Vec<Vec<(f64, f64)>> {
         let ends = |(curve, bars): (&Curve, &Vec<f64>)| {
             let both = |(&(x, y), bar): (&(f64, f64), &f64)| [(x, y - bar), (x, y + bar)];
@@ -630,7 +637,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         let half = self.px(6.0);
         for pair in ends.chunks_exact(2) {
             let place = |(px, py): (f64, f64)| {
-                // A lower end that a logarithm cannot show is beyond the frame.
+                // A lower end that is not positive is drawn at the frame on a logarithmic axis.
                 let (u, v) = (x.place(px)?, y.place(py).unwrap_or(0.0));
                 Some((left + (u * width).round() as i32, bottom - (v * height).round() as i32))
             };
@@ -655,7 +662,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         for piece in places.split(Option::is_none) {
             let piece: Vec<(i32, i32)> = piece.iter().flatten().copied().collect();
             let piece = if piece.len() > MOST_POINTS { extremes(&piece) } else { piece };
-            // A single point has no line, and would vanish.
+            // A single point has no line and would be invisible.
             if curve.marks || piece.len() == 1 {
                 for &at in &piece {
                     self.area.draw(&Circle::new(at, self.px(4.5), color.filled()))?;
@@ -667,7 +674,7 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
     }
 }
 
-/// First, lowest, highest and last point of each column of pixels.
+/// Keeps the first, lowest, highest and last point of each pixel column.
 fn extremes(points: &[(i32, i32)]) -> Vec<(i32, i32)> {
     let mut thin: Vec<(i32, i32)> = Vec::new();
     for column in points.chunk_by(|a, b| a.0 == b.0) {
@@ -685,7 +692,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn labels_pull_out_the_power_of_ten() {
+    fn axis_labels_contain_the_power_of_ten() {
         let label = |name: &str, unit: &str, exponent| axis_label(&Axis::new(name, unit), exponent);
         assert_eq!(label("time", "s", -3), "time (ms)");
         assert_eq!(label("time", "s", 3), "time (1e3 s)");
@@ -703,7 +710,7 @@ mod tests {
     }
 
     #[test]
-    fn strange_data_is_drawn_all_the_same() {
+    fn degenerate_data_cause_no_error() {
         let folder = crate::testing::TempFolder::new().expect("a temporary folder");
         let curves: [&[(f64, f64)]; 6] = [
             &[],

@@ -1,19 +1,18 @@
-//! Recordings for the Rerun viewer. Only this module knows Rerun.
+//! This module writes recordings for the Rerun viewer. No other module uses Rerun.
 //!
 //! One recording holds one run, under `runs/<name>`:
 //!
 //! | entity | what it shows |
 //! |---|---|
 //! | `world/particles`, `world/dye`, `world/directors` | the flow |
-//! | `world/walls`, `world/gauges` | what does not move |
+//! | `world/walls`, `world/gauges` | fixed lines |
 //! | `world/fields/<field>/{image,bar,ticks,isolines}` | one field |
-//! | `world/fields/<field>/values` | its numbers, on half as many samples a side |
+//! | `world/fields/<field>/values` | its values, on half as many samples per side |
 //! | the path of each scalar, and `<path>/log10` | the plots |
-//! | `scene`, `plan`, `log` | what was asked, what is solved, what went wrong |
+//! | `scene`, `plan`, `log` | input, solved effects, warnings |
 //!
-//! Timelines are `sim_time`, `step` and `wall_time`. Positions are metres with
-//! y up; the viewer draws y down, so `world` is mirrored by a static transform
-//! and looked at from its parent.
+//! Timelines are `sim_time`, `step` and `wall_time`. Positions are in metres with y up. The viewer
+//! draws y down, so a static transform mirrors `world`, and views have its parent as their origin.
 
 mod bar;
 mod blueprint;
@@ -49,35 +48,43 @@ use crate::record::color::{ColorScale, OKABE_ITO};
 use crate::record::number::short;
 use sinks::{Destinations, Live, Page, RrdFile};
 
-/// The application all recordings belong to.
+/// Application identifier of all recordings.
 const APPLICATION: &str = "grainscope";
 
-/// Where entities of runs live.
+/// Root path of the entities of runs.
 const RUNS: &str = "runs";
 
 const SIM_TIME: &str = "sim_time";
 const STEP: &str = "step";
 const WALL_TIME: &str = "wall_time";
 
-/// How often it is checked that everything arrived.
+/// Interval of the checks that everything has arrived.
 const CHECK_EVERY: Duration = Duration::from_secs(2);
 
-/// How long a check may take. Slow disks exist; hung ones are an error.
+/// Time limit of a check. It allows for slow disks; a longer wait is an error.
 const CHECK_PATIENCE: Duration = Duration::from_secs(60);
 
-/// A file alone is written in pieces of this age: the default of 0.2 s would
-/// make five pieces per curve and second, which viewers have to merge again.
+/// Age at which chunks are written if the recording goes to a file only. The default of 0.2 s would
+/// make five chunks per curve and second, which viewers have to merge again.
 const FILE_TICK: Duration = Duration::from_secs(1);
 
-/// From back to front.
+/// Draw order, from back to front.
 mod depth {
+    /// Draw order of field images.
     pub const FIELD: f32 = -20.0;
+    /// Draw order of particles.
     pub const PARTICLES: f32 = 0.0;
+    /// Draw order of director strokes and arrows.
     pub const GLYPHS: f32 = 10.0;
+    /// Draw order of dye lines.
     pub const DYE: f32 = 20.0;
+    /// Draw order of isolines.
     pub const ISOLINES: f32 = 25.0;
+    /// Draw order of walls.
     pub const WALLS: f32 = 30.0;
+    /// Draw order of gauges.
     pub const GAUGES: f32 = 40.0;
+    /// Draw order of legends.
     pub const LEGEND: f32 = 50.0;
 }
 
@@ -89,44 +96,44 @@ const LINE: [u8; 3] = [20, 20, 24];
 const ARROW: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [30, 30, 34];
 
-/// Why a recording failed.
+/// Error of writing a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The file cannot be written.
     #[error("the recording {} cannot be written: {cause}", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Cause, as reported by the operating system or the encoder.
         cause: String,
     },
-    /// A viewer cannot be reached, and nothing else receives the recording.
+    /// A viewer cannot be reached, and there is no other destination.
     #[error("the viewer at {name} does not answer: {cause}")]
     Viewer {
-        /// Which viewer.
+        /// Name or address of the viewer.
         name: String,
-        /// What the connection says.
+        /// Cause, as reported by the connection.
         cause: String,
     },
-    /// A port to serve on is taken.
+    /// A port to serve on cannot be used.
     #[error("port {port} of this machine cannot be used: {source}; 0 takes any free port")]
     Port {
-        /// The port asked for.
+        /// The requested port.
         port: u16,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Rerun does not take what it was given.
+    /// Rerun rejects its input.
     #[error("the recording could not be made: {0}")]
     Stream(#[from] rerun::RecordingStreamError),
     /// A picture has arrays of different lengths.
-    #[error("{what}: {found} values where {expected} belong")]
+    #[error("{what}: {found} values; {expected} were expected")]
     Length {
-        /// Which array.
+        /// Name of the array.
         what: String,
-        /// How many values it has.
+        /// Number of values.
         found: usize,
-        /// How many it should have.
+        /// Required number of values.
         expected: usize,
     },
 }
@@ -146,7 +153,7 @@ impl Paths {
         Self { root: EntityPath::new(parts.to_vec()) }
     }
 
-    /// The entity at a path of the run, parts separated by slashes.
+    /// The entity at a path below the run; parts are separated by slashes.
     fn at(&self, path: &str) -> EntityPath {
         let parts = path.split('/').filter(|part| !part.is_empty());
         let parts = parts.map(|part| EntityPathPart::new(part.to_owned()));
@@ -163,40 +170,40 @@ impl Paths {
     }
 }
 
-/// A recording in the making.
+/// An open recording.
 pub struct RerunLog {
     rec: RecordingStream,
     paths: Paths,
     domain: Rect,
     quantities: HashMap<String, Quantity>,
     particle_quantity: Option<Quantity>,
-    /// Scalars that are also wanted as logarithms.
+    /// Paths of the scalars that are also recorded as decimal logarithms.
     logarithms: HashSet<String>,
     files: Vec<RrdFile>,
     viewers: Vec<Live>,
     page: Option<Page>,
     notices: Vec<String>,
     checked: Instant,
-    /// Class numbers as last recorded: repeated only if they change.
+    /// Class numbers as last recorded; they are recorded again only when they change.
     classes: Vec<u16>,
-    /// Whether particles were last coloured by a number.
+    /// Whether the particles were last coloured by a scalar.
     colored: bool,
-    /// Colour scales as last recorded, by the entity of their bar.
+    /// Colour scales as last recorded, by the entity of the field.
     scales: HashMap<EntityPath, ColorScale>,
-    /// Entities of isolines last drawn, to be wiped when they are gone.
+    /// Entities of the isolines drawn last; they are cleared when they are no longer drawn.
     isolines: HashSet<EntityPath>,
     pictures: u64,
 }
 
-/// What became of a recording.
+/// Result of a finished recording.
 pub struct Finished {
-    /// Files that are complete now.
+    /// Files that are complete.
     pub saved: Vec<Saved>,
-    /// How many pictures were recorded.
+    /// Number of recorded pictures.
     pub pictures: u64,
-    /// Viewers that were lost on the way, in words.
+    /// Messages about viewers whose connection was lost.
     pub notices: Vec<String>,
-    /// The page, if there is one; it is served until this is dropped.
+    /// The page, if there is one. It is served until this value is dropped.
     pub served: Option<Served>,
 }
 
@@ -207,14 +214,14 @@ pub struct Served {
 }
 
 impl Served {
-    /// What to open in a browser.
+    /// Address of the page, to be opened in a browser.
     pub fn url(&self) -> &str {
         &self.page.url
     }
 }
 
 impl RerunLog {
-    /// Starts a recording: destinations, layout and all that does not change.
+    /// Starts a recording: opens its destinations and records the layout and everything constant.
     pub fn open(info: &RunInfo, sinks: &[Sink]) -> Result<Self, RecordError> {
         let mut to = Destinations::open(sinks)?;
         let rec = to.begin(&info.recording_id)?;
@@ -223,14 +230,15 @@ impl RerunLog {
         Self::of(rec, info).towards(to, info)
     }
 
-    /// Attaches destinations, and records all that does not change.
+    /// Attaches the destinations and records everything constant.
     fn towards(mut self, to: Destinations, info: &RunInfo) -> Result<Self, RecordError> {
         let log = &mut self;
         log.files = to.files;
         log.viewers = to.viewers;
         log.page = to.page;
         log.constant(info)?;
-        // A viewer that is absent from the start is a mistake in the command; the check forgets it.
+        // A viewer that is absent from the start is an error of the command line. `check` would
+        // drop it.
         let wanted = log.viewers.clone();
         log.check()?;
         wanted.iter().try_for_each(Live::check)?;
@@ -243,7 +251,7 @@ impl RerunLog {
         self.curves(info)
     }
 
-    /// A run that goes to a stream, without destinations of its own.
+    /// A recording on an existing stream, without destinations of its own.
     fn of(rec: RecordingStream, info: &RunInfo) -> Self {
         Self {
             rec,
@@ -270,17 +278,17 @@ impl RerunLog {
         }
     }
 
-    /// What to open in a browser, or in a viewer if only data is streamed.
+    /// Address to open in a browser, or in a viewer if only the data is streamed.
     pub fn url(&self) -> Option<&str> {
         self.page.as_ref().map(|page| page.url.as_str())
     }
 
-    /// Viewers lost so far, in words; each is told once.
+    /// Returns new messages about lost viewers. Each message is returned once.
     pub fn take_notices(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notices)
     }
 
-    /// Records one step.
+    /// Records the frame of one step.
     pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
         let step = i64::try_from(frame.step).unwrap_or(i64::MAX);
         self.rec.set_duration_secs(SIM_TIME, frame.time_s);
@@ -307,7 +315,7 @@ impl RerunLog {
         Ok(())
     }
 
-    /// Ends the recording and makes sure that all of it arrived.
+    /// Ends the recording and checks that all of it has arrived.
     pub fn finish(mut self) -> Result<Finished, RecordError> {
         self.check()?;
         let saved = self.files.iter().map(RrdFile::finish);
@@ -322,8 +330,8 @@ impl RerunLog {
 
     /// Waits until everything recorded so far has arrived.
     fn check(&mut self) -> Result<(), RecordError> {
-        // The result is that of the worst destination; which one it was, and
-        // whether it matters, is asked below.
+        // The result is that of the worst destination. The checks below find out which one it was,
+        // and whether it matters.
         let flushed = self.rec.flush_with_timeout(CHECK_PATIENCE);
         self.checked = Instant::now();
         for file in &self.files {
@@ -350,7 +358,7 @@ impl RerunLog {
         }
     }
 
-    /// Walls, gauges, legends, and the transform that turns y up.
+    /// Records walls, gauges, legends, and the transform that makes y point up.
     fn world(&mut self, info: &RunInfo) -> Result<(), RecordError> {
         let world = self.paths.at("world");
         self.rec
@@ -392,7 +400,8 @@ impl RerunLog {
             let named = gauges.map(|gauge| (middle(&gauge.points), gauge.name.as_str()));
             self.names("world/gauges/names", named)?;
         }
-        // One material needs no legend, and a colour bar stands in its place.
+        // A single material needs no legend; with a particle quantity, a colour bar is in its
+        // place.
         let materials: Vec<_> = info.materials.iter().filter(|material| material.drawn).collect();
         if info.particle_quantity.is_none() && materials.len() > 1 {
             let row = bar::row(info.domain, materials.len());
@@ -410,8 +419,8 @@ impl RerunLog {
         Ok(())
     }
 
-    /// Writes names below points. They are entities of their own because a
-    /// label takes the colour of what it labels, which may be hard to read.
+    /// Writes names below points. They are separate entities because a label takes the colour of
+    /// the labelled point, which may be hard to read.
     fn names<'a>(
         &self,
         path: &str,
@@ -431,7 +440,7 @@ impl RerunLog {
     }
 
     fn texts(&self, info: &RunInfo) -> Result<(), RecordError> {
-        // A fence longer than any inside the text cannot be closed by it.
+        // The fence must be longer than any fence inside the text.
         let mut fence = "```".to_owned();
         while info.scene_toml.contains(&fence) {
             fence.push('`');
@@ -444,7 +453,7 @@ impl RerunLog {
         Ok(())
     }
 
-    /// Names and colours of the curves.
+    /// Records the names and colours of the curves.
     fn curves(&self, info: &RunInfo) -> Result<(), RecordError> {
         for plot in &info.plots {
             for (series, color) in plot.series.iter().zip(OKABE_ITO.iter().cycle()) {
@@ -462,7 +471,7 @@ impl RerunLog {
         Ok(())
     }
 
-    /// Curves of several runs share plots: there a colour tells the run, and a name if given.
+    /// Gives all curves of a run one colour, and `name` if given: the plot contains several runs.
     fn one_color(
         &self,
         info: &RunInfo,
@@ -582,7 +591,7 @@ impl RerunLog {
         self.scale_bar(&path, scale)
     }
 
-    /// The numbers of a field, which its colours do not tell exactly. No view draws them.
+    /// Records the values of a field, which its colours do not give exactly. No view shows them.
     fn values(&self, field: &GridField) -> Result<(), RecordError> {
         let coarse = field.on(field.rect(), field.nx.div_ceil(2), field.ny.div_ceil(2));
         let shape = vec![coarse.ny as u64, coarse.nx as u64];
@@ -595,7 +604,7 @@ impl RerunLog {
         Ok(())
     }
 
-    /// A colour bar with numbers, drawn again when its ends change.
+    /// Draws a colour bar with numbers; it is drawn again when its ends change.
     fn scale_bar(&mut self, path: &EntityPath, scale: ColorScale) -> Result<(), RecordError> {
         let last = self.scales.insert(path.clone(), scale);
         if last == Some(scale) {
@@ -656,7 +665,7 @@ impl RerunLog {
         }
         for (path, lines) in &groups {
             let strips = lines.iter().flat_map(|line| {
-                // One label per level: on its longest strip.
+                // One label per level, on its longest strip.
                 let longest = (line.strips.iter().enumerate())
                     .max_by_key(|(_, strip)| strip.len())
                     .map(|(i, _)| i);
@@ -693,7 +702,7 @@ fn rgb8([r, g, b]: [u8; 3]) -> rerun::Rgba32 {
     rerun::Rgba32::from_rgb(r, g, b)
 }
 
-/// A colour of curves, lifted where it would drown in the viewer's dark theme.
+/// The colour of a curve, lightened where its contrast in the dark theme of the viewer is too low.
 fn on_dark(color: [u8; 3]) -> [u8; 3] {
     match color {
         [0, 0, 0] => [220, 220, 220],
@@ -702,7 +711,7 @@ fn on_dark(color: [u8; 3]) -> [u8; 3] {
     }
 }
 
-/// The point halfway between the ends of a polyline.
+/// The midpoint between the ends of a polyline.
 fn middle(points: &[[f32; 2]]) -> [f32; 2] {
     match (points.first(), points.last()) {
         (Some(a), Some(b)) => [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])],

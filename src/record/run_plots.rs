@@ -1,11 +1,11 @@
-//! The plots that every run leaves.
+//! This module draws the plots that every run writes.
 
 use super::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_plot};
 use crate::plan::Plan;
 use crate::sim::row::Row;
 use std::path::Path;
 
-/// Writes the plots of a run into its folder: what flowed out, alignment, balances.
+/// Writes the plots of a run into its folder: outflow, alignment and balance errors.
 pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), PlotError> {
     let time = || Axis::new("time", "s");
     let curve = |name: &str, value: &dyn Fn(&Row) -> f64| Curve {
@@ -23,13 +23,13 @@ pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), Plot
             &folder.join("outflow"),
             &[
                 PlotSpec {
-                    title: format!("{title}: volume that has flowed out"),
+                    title: format!("{title}: outflow volume"),
                     x: time(),
                     y: Axis::new("outflow volume", "m²"),
                     curves: of(&|r, k| r.gauges[k].volume),
                 },
                 PlotSpec {
-                    title: "rate of outflow".into(),
+                    title: "outflow rate".into(),
                     x: time(),
                     y: Axis::new("outflow rate", "m²/s"),
                     curves: of(&|r, k| r.gauges[k].rate),
@@ -44,14 +44,14 @@ pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), Plot
                 title: format!("{title}: alignment of the directors"),
                 x: time(),
                 y: Axis::new("mean |n_x|", ""),
-                curves: vec![curve("mean |n_x|", &|r| r.alignment.unwrap_or(f64::NAN))],
+                curves: vec![curve("mean |n_x|", &|r| r.mean_alignment.unwrap_or(f64::NAN))],
             },
         )?;
     }
     line_plot(
         &folder.join("diagnostics"),
         &PlotSpec {
-            title: format!("{title}: balances"),
+            title: format!("{title}: balance errors"),
             x: time(),
             y: Axis::new("relative error", "").log(),
             curves: vec![

@@ -1,7 +1,7 @@
-//! Sheets of snapshots on paper: a row for each run, a column for each time, as SVG and PNG.
+//! This module draws sheets of snapshots as SVG and PNG: one row per run, one column per time.
 //!
-//! Grains are drawn as the area they cover, not one by one: a sheet of particles would be an SVG of
-//! tens of megabytes.
+//! The sheet shows the area that particles cover, not single particles: an SVG of all particles
+//! would have tens of megabytes.
 
 use super::number::short;
 use super::plots::{Drawing, Drawn, INK, Pen, PlotError, write};
@@ -11,48 +11,55 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::Path;
 
-/// Width of the whole sheet (pixels), at most.
+/// Maximum width of the sheet (pixels).
 const WIDTH: f64 = 1200.0;
-/// Width of a snapshot (pixels), at most.
+/// Maximum width of a snapshot (pixels).
 const SNAPSHOT: f64 = 380.0;
-/// Height of a snapshot (pixels), at most.
+/// Maximum height of a snapshot if the sheet has several rows (pixels); twice this for one row.
 const HEIGHT: f64 = 380.0;
-/// Room for the title and the heads of columns.
+/// Height of the title and the column headings (pixels).
 const HEAD: f64 = 86.0;
-/// Room for the names of rows.
+/// Width of the row names (pixels).
 const SIDE: f64 = 128.0;
-/// Room between snapshots, and around all.
+/// Space between snapshots, and margin of the sheet (pixels).
 const GAP: f64 = 14.0;
 
-/// Particles cover squares of this many times their spacing, so that no paper shows between them.
+/// Side of the square that a particle covers, relative to the particle spacing. It exceeds 1 so
+/// that the background does not show between particles.
 const OVERLAP: f32 = 1.35;
 
-/// Gaps between particles wider than this share of a snapshot are gaps of the material.
+/// Widest gap between particles that is filled, relative to the width of a snapshot. Wider gaps are
+/// gaps in the material.
 const WIDEST_GAP: f64 = 0.035;
 
-/// Level lines shorter than this share of the domain are noise of few particles.
+/// Shortest isoline that is drawn, relative to the domain. Shorter ones are noise from few
+/// particles.
 const SMALLEST_LINE: f32 = 0.06;
 
 const LEVEL: RGBColor = RGBColor(0, 90, 150);
 const STROKE: RGBColor = RGBColor(150, 150, 155);
 
-/// What a sheet shows.
+/// Content of a sheet.
 pub struct Sheet {
+    /// Title above the sheet.
     pub title: String,
-    /// Heads of the columns.
+    /// Headings of the columns.
     pub columns: Vec<String>,
+    /// Rows of the sheet, from the top.
     pub rows: Vec<Row>,
 }
 
-/// One run.
+/// One row of the sheet: the snapshots of one run.
 pub struct Row {
+    /// Name of the run, written at the left.
     pub name: String,
+    /// Constant part of the recording of the run.
     pub info: RunInfo,
-    /// One picture a column.
+    /// Snapshots of the run, one per column.
     pub pictures: Vec<Picture>,
 }
 
-/// Writes `<stem>.svg` and `<stem>.png`.
+/// Writes the sheet to `<stem>.svg` and `<stem>.png`.
 pub fn sheet(stem: &Path, sheet: &Sheet) -> Result<(), PlotError> {
     let (_, height) = sheet.snapshot();
     let full = HEAD + (height + GAP) * sheet.rows.len() as f64 + GAP;
@@ -60,25 +67,25 @@ pub fn sheet(stem: &Path, sheet: &Sheet) -> Result<(), PlotError> {
 }
 
 impl Sheet {
-    /// Room for the names of rows: one row needs none.
+    /// Width of the row names (pixels). A single row has no name.
     fn side(&self) -> f64 {
         if self.rows.len() > 1 { SIDE } else { GAP }
     }
 
-    /// Width and height of a snapshot.
+    /// Width and height of a snapshot (pixels).
     fn snapshot(&self) -> (f64, f64) {
         let columns = self.columns.len().max(1) as f64;
         let width = ((WIDTH - self.side() - GAP * columns) / columns).min(SNAPSHOT);
         let domains = self.rows.iter().map(|row| row.info.domain).reduce(Rect::around);
         let [w, h] = domains.unwrap_or_default().size();
         let ratio = if w > 0.0 { f64::from(h / w) } else { 1.0 };
-        // Several rows are seen at once only if each is low.
+        // Several rows fit on a screen only if each is low.
         let most = if self.rows.len() > 1 { HEIGHT } else { 2.0 * HEIGHT };
         let width = if width * ratio > most { most / ratio } else { width };
         (width, width * ratio)
     }
 
-    /// Width of the whole sheet.
+    /// Width of the sheet (pixels).
     fn width(&self) -> f64 {
         self.side() + (self.snapshot().0 + GAP) * self.columns.len().max(1) as f64
     }
@@ -111,12 +118,12 @@ impl Drawing for Sheet {
     }
 }
 
-/// One picture and the part of the sheet it fills.
+/// A snapshot and the part of the sheet that it fills.
 struct Snapshot<'a, B: DrawingBackend> {
     root: &'a DrawingArea<B, Shift>,
     pen: Pen,
     info: &'a RunInfo,
-    /// Left, top, width, height (pixels of the figure).
+    /// Left, top, width and height (pixels of the figure).
     place: [f64; 4],
 }
 
@@ -167,7 +174,7 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
     }
 
     fn line(&self, points: &[[f32; 2]], color: RGBColor, width: f64) -> Drawn<B> {
-        // Closer than a pixel nothing is seen, and the file grows.
+        // Points closer than a pixel are dropped: they are not visible, and the file grows.
         let near = self.pen.px(1.0);
         let mut places: Vec<(i32, i32)> = vec![];
         for (k, point) in points.iter().enumerate() {
@@ -180,7 +187,7 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
         self.pen.polyline(self.root, places, self.pen.stroke(color, width))
     }
 
-    /// Whether a level line is more than noise.
+    /// Whether an isoline is long enough to be drawn.
     fn is_seen(&self, strip: &[[f32; 2]]) -> bool {
         let [w, h] = self.info.domain.size();
         let extent = |c: usize| {
@@ -190,8 +197,8 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
         extent(0).max(extent(1)) > SMALLEST_LINE * w.max(h)
     }
 
-    /// How far from the frame a point is, relative to the domain. Away from the middle, where lines
-    /// of all levels would have their numbers.
+    /// Distance of a point from the frame, relative to the domain and at most 0.2. The bound keeps
+    /// the labels of all levels from meeting in the middle.
     fn depth(&self, [x, y]: &[f32; 2]) -> f32 {
         let Rect { min, max } = self.info.domain;
         let [w, h] = self.info.domain.size();
@@ -199,7 +206,7 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
         of(*x, min[0], max[0], w).min(of(*y, min[1], max[1], h))
     }
 
-    /// The number of a level on its longest line, on a patch of paper.
+    /// Writes the value of a level onto its longest isoline, on a white rectangle.
     fn level(&self, level: f32, strips: &[Vec<[f32; 2]>]) -> Drawn<B> {
         let Some(longest) = strips.iter().max_by_key(|strip| strip.len()) else { return Ok(()) };
         let Some(point) = longest.iter().max_by(|a, b| self.depth(a).total_cmp(&self.depth(b)))
@@ -214,8 +221,8 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
         self.pen.text(self.root, &short(f64::from(level)), 15.0, (x, y), centre)
     }
 
-    /// The area that particles cover, in the colours of their materials; none if one material fills
-    /// everything.
+    /// Fills the area that particles cover with the colours of their materials. Nothing is drawn if
+    /// one material fills the whole domain.
     fn area(&self, particles: &ParticleSnapshot) -> Drawn<B> {
         let drawn = self.info.materials.iter().filter(|m| m.drawn && m.name != "marked").count();
         if drawn == self.info.materials.iter().filter(|m| m.name != "marked").count() && drawn < 2 {
@@ -241,11 +248,11 @@ impl<B: DrawingBackend> Snapshot<'_, B> {
     }
 }
 
-/// Which material covers which pixel.
+/// Raster of the material that covers each pixel.
 struct Cover {
     domain: Rect,
     n: [usize; 2],
-    /// Class plus one; zero where there is nothing.
+    /// Class plus one; zero where no particle is.
     pixels: Vec<u16>,
 }
 
@@ -272,7 +279,7 @@ impl Cover {
         cover
     }
 
-    /// Fills gaps of a few pixels along a row or a column, which particles leave where the flow
+    /// Fills gaps of a few pixels along rows and columns. Particles leave such gaps where the flow
     /// stretches.
     fn close(&mut self) {
         let [nx, ny] = self.n;
@@ -295,14 +302,15 @@ impl Cover {
         }
     }
 
-    /// Lower left corner of a pixel.
+    /// Lower left corner of a pixel (m).
     fn point(&self, i: usize, j: usize) -> [f32; 2] {
         let size = self.domain.size();
         let at = |c: usize, k: usize| self.domain.min[c] + size[c] * k as f32 / self.n[c] as f32;
         [at(0, i), at(1, j)]
     }
 
-    /// Rectangles of one class: runs of pixels, joined with equal ones in the rows above.
+    /// Rectangles of one class, as class and `[i0, j0, i1, j1]`: runs of pixels in a row, merged
+    /// with equal runs in the rows above.
     fn rectangles(&self) -> Vec<(u16, [usize; 4])> {
         let mut done: Vec<(u16, [usize; 4])> = vec![];
         let mut open: Vec<(u16, [usize; 4])> = vec![];
@@ -334,7 +342,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rectangles_cover_what_particles_cover() {
+    fn rectangles_cover_the_particles() {
         let domain = Rect { min: [0.0, 0.0], max: [4.0, 4.0] };
         let positions = vec![[0.5, 0.5], [1.5, 0.5], [0.5, 1.5], [1.5, 1.5], [3.5, 3.5]];
         let particles = ParticleSnapshot { positions, class: vec![0, 0, 0, 0, 1], scalar: None };

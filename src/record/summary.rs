@@ -1,142 +1,196 @@
-//! `summary.json`: what a run was and how it ended.
+//! This module builds `summary.json`: the settings, results and diagnostics of a run.
 
 use super::logger::Traffic;
 use crate::scene::scene_hash;
 use crate::sim::Run;
-use crate::sim::row::{GaugeRow, Phases, Row};
+use crate::sim::phases::Phases;
+use crate::sim::row::{GaugeRow, Row};
 use indexmap::IndexMap;
 use serde::Serialize;
 
-/// Version of the summary's format.
+/// Version of the format of `summary.json`.
 pub const SCHEMA: u32 = 1;
 
-/// How a run ended.
+/// Reason for the end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
+    /// The end time of the scene was reached.
     Finished,
-    /// `--steps` was reached.
+    /// The limit of `--steps` was reached.
     StepLimit,
-    /// `--budget` was spent.
+    /// The time of `--budget` was used up.
     BudgetSpent,
+    /// The run was interrupted by a signal or by the user.
     Interrupted,
+    /// The run stopped with an error.
     Failed,
 }
 
-/// Everything in `summary.json`; SI units.
+/// Content of `summary.json`, in SI units.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
+    /// Version of the format: [`SCHEMA`].
     pub schema: u32,
+    /// Version of the program.
     pub version: &'static str,
+    /// Name of the scene.
     pub scene: String,
+    /// SHA-256 of the resolved scene, hexadecimal.
     pub scene_hash: String,
-    /// SHA-256 over the bits of the final particle state.
+    /// SHA-256 of the bits of the final particle state, hexadecimal.
     pub state_hash: String,
+    /// Folder of the run.
     pub folder: String,
+    /// Reason for the end of the run.
     pub ending: Ending,
+    /// Error message of a failed run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
+    /// Number of steps.
     pub steps: u64,
+    /// Simulated time at the end (s).
     pub time: f64,
+    /// Largest speed at the end (m/s).
     pub max_speed: f64,
+    /// Root mean square speed at the end (m/s).
     pub rms_speed: f64,
+    /// Number of particles at the end.
     pub particles: usize,
+    /// Number of cells along x and y.
     pub cells: [usize; 2],
+    /// Number of unknowns.
     pub unknowns: Unknowns,
+    /// Outflow volume and rate at the end, by gauge.
     pub gauges: IndexMap<String, GaugeRow>,
+    /// Relative change of the projected area since the start, by material.
     pub volume_drift: IndexMap<String, f64>,
-    /// Volume mean of |n_x| over layered particles.
+    /// Volume mean of |n_x| over particles with layers; absent without directors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_alignment: Option<f64>,
+    /// Errors of the balances.
     pub balances: Balances,
+    /// Counts of splits, merges, particles held at walls or lost through open sides, and healed
+    /// cells.
     pub population: IndexMap<&'static str, u64>,
+    /// Wall-clock seconds by phase of the program.
     pub seconds: IndexMap<&'static str, f64>,
+    /// Counts and waiting times of the logger.
     pub frames: FrameCounts,
+    /// Path of the recording; absent if there is none.
     pub recording: Option<String>,
+    /// Warnings of the run.
     pub warnings: Vec<String>,
-    /// What `--accuracy` or `--budget` bought.
+    /// Settings chosen by `--accuracy` or `--budget`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub purchase: Option<Purchase>,
 }
 
-/// Settings bought from a price list, what was expected of them and what came.
+/// Settings chosen from a cost table, with their expected and actual accuracy and time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Purchase {
+    /// Settings, as text.
     pub settings: String,
+    /// Settings, in the form of `--set`.
     pub sets: Vec<String>,
+    /// Quantity whose error is measured.
     pub quantity: String,
-    /// Relative, of the discretisation.
+    /// Expected relative error of the discretisation.
     pub accuracy: f64,
-    /// Relative; absent if it was not seen.
+    /// Relative spread over particle placements and seeds; absent if it was not measured.
     pub sampling: Option<f64>,
+    /// Expected wall-clock time (s).
     pub expected_seconds: f64,
+    /// Actual wall-clock time (s).
     pub seconds: f64,
-    /// Whether the run reached its end; before it, nothing is promised.
+    /// Whether the run reached its end. The expected accuracy applies only then.
     pub finished: bool,
-    /// Error bars of the gauges' volumes, m2: discretisation, sampling.
+    /// Error bars of the outflow volume of each gauge (m²): discretisation, sampling.
     pub bars: IndexMap<String, [f64; 2]>,
 }
 
+/// Number of unknowns of a solve.
 #[derive(Clone, Debug, Serialize)]
 pub struct Unknowns {
+    /// Velocity and rotation unknowns.
     pub velocity_and_rotation: usize,
+    /// Pressure unknowns.
     pub pressure: usize,
+    /// Rotation unknowns that a Cosserat material acts on.
     pub active_rotation: usize,
+    /// Velocity, rotation and pressure unknowns together.
     pub total: usize,
 }
 
-/// How well what must hold held.
+/// Relative errors of the balances.
 #[derive(Clone, Debug, Serialize)]
 pub struct Balances {
-    /// Largest over the run.
+    /// Largest error of the power balance over the run.
     pub power_error: f64,
-    /// Largest over the run.
+    /// Largest error of the divergence over the run.
     pub divergence_error: f64,
-    /// At the end.
+    /// Volume error at the end.
     pub volume_error: f64,
+    /// Largest `| |n| - 1 |` at the end.
     pub director_error: f64,
-    /// Potential energy lost plus work done by other loads, less what was dissipated, over the
-    /// latter: sees quadrature, advection and time stepping. Absent where particles' potential
-    /// energy does not tell: gravity along a periodic axis, open sides.
+    /// (Potential energy lost plus work of other loads minus dissipated energy) over the dissipated
+    /// energy. This error contains those of quadrature, advection and time stepping. It is absent
+    /// where the potential energy of particles does not determine the balance: gravity along a
+    /// periodic axis, open sides.
     pub energy_error: Option<f64>,
 }
 
+/// Counts and waiting times of the logger.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameCounts {
+    /// Frames sent to the logger.
     pub sent: u64,
+    /// Frames dropped because the logger was behind.
     pub dropped: u64,
+    /// Frames that had to wait for the logger.
     pub waits: u64,
+    /// Time that the simulation waited for the logger (s).
     pub waited_seconds: f64,
+    /// Time that the logger was busy (s).
     pub logger_seconds: f64,
 }
 
-/// What the loop around a run kept count of.
+/// Totals and maxima collected by the loop around a run.
 #[derive(Clone, Debug)]
 pub struct Tally {
+    /// Wall-clock seconds by phase, summed over the steps.
     pub phases: Phases,
+    /// Wall-clock time of the whole run (s).
     pub wall: f64,
+    /// Largest relative error of the power balance.
     pub largest_power_error: f64,
+    /// Largest relative error of the divergence.
     pub largest_divergence: f64,
+    /// Potential energy at the start (J/m).
     pub first_energy: f64,
+    /// Frames sent, dropped and delayed.
     pub traffic: Traffic,
+    /// Time that the logger was busy (s).
     pub logger_seconds: f64,
+    /// Wall-clock seconds outside the steps.
     pub around: Around,
+    /// Warnings of the run.
     pub warnings: Vec<String>,
 }
 
-/// Wall seconds around the steps.
+/// Wall-clock seconds outside the steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Around {
-    /// Filling cells, analysis of the mesh.
+    /// Particle seeding and mesh analysis.
     pub set_up: f64,
-    /// Examining steps and keeping the last good state.
+    /// Checks of each step and copies of the last valid state.
     pub guard: f64,
-    /// Rows, pictures, checkpoints.
+    /// Output of rows, pictures and checkpoints.
     pub writing: f64,
 }
 
 impl Tally {
-    /// Of a run that stands at its first instant.
+    /// The tally of a run at its first instant.
     pub fn new(first: &Row, warnings: Vec<String>) -> Tally {
         Tally {
             phases: Phases::default(),
@@ -151,7 +205,7 @@ impl Tally {
         }
     }
 
-    /// Counts a step in.
+    /// Adds a step.
     pub fn add(&mut self, row: &Row) {
         self.phases.add(&row.seconds);
         self.largest_power_error = self.largest_power_error.max(row.power_error);
@@ -160,6 +214,7 @@ impl Tally {
 }
 
 impl Summary {
+    /// The summary of a run in its present state.
     pub fn new(
         run: &dyn Run,
         tally: &Tally,
@@ -217,14 +272,14 @@ impl Summary {
                 .map(|m| m.name.clone())
                 .zip(row.drift.iter().copied())
                 .collect(),
-            mean_alignment: row.alignment,
+            mean_alignment: row.mean_alignment,
             balances: Balances {
                 power_error: tally.largest_power_error,
                 divergence_error: tally.largest_divergence,
                 volume_error: row.volume_error,
                 director_error: row.director_error,
                 energy_error: energy_tells.then(|| {
-                    // Less than this share of the energy there is, is rounding: the scene is at rest.
+                    // A smaller difference is rounding: the scene is at rest.
                     let scale = row.dissipated.max(1e-6 * tally.first_energy.abs());
                     if scale > 0.0 { (lost - row.dissipated) / scale } else { 0.0 }
                 }),

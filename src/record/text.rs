@@ -1,8 +1,8 @@
-//! Plans and times in words.
+//! This module formats plans and durations as text.
 
 use crate::plan::EffectList;
 
-/// A plan as Markdown, for the recording's panel.
+/// Formats a plan as Markdown, for the panel of the recording.
 pub fn plan_markdown(plan: &EffectList) -> String {
     let mut out = format!("# {}\n\n{}\n\n", plan.scene, sizes(plan));
     out += "| effect | solved | why |\n|---|---|---|\n";
@@ -19,7 +19,7 @@ pub fn plan_markdown(plan: &EffectList) -> String {
     out
 }
 
-/// A plan for the terminal.
+/// Formats a plan for the terminal.
 pub fn plan_text(plan: &EffectList) -> String {
     let mut out = format!("{}: {}\n\n", plan.scene, sizes(plan));
     let measured = plan.step.is_some();
@@ -52,9 +52,9 @@ pub fn plan_text(plan: &EffectList) -> String {
         let words: Vec<_> =
             phases.map(|(name, s)| format!("{name} {:.1} %", 100.0 * s / total)).collect();
         out += &format!(
-            "\na step: {} of a processor (median of {}): {}\n\
-             share: 1 - (a step of the scene without the effect)/(a step with it); of gravity, dye \
-             and cut\ncells, that of their own stages\n",
+            "\nprocessor time of a step: {} (median of {} steps): {}\n\
+             share: 1 - (time of a step without the effect)/(time of a step with it); for gravity, \
+             dye\nand cut cells, the share of their own stages\n",
             duration(step.seconds),
             step.steps,
             words.join(", ")
@@ -68,7 +68,7 @@ pub fn plan_text(plan: &EffectList) -> String {
     out
 }
 
-/// A measured share of a step.
+/// Formats a measured share of the time of a step.
 fn share(share: Option<f64>) -> String {
     match share {
         None => "-".into(),
@@ -93,7 +93,7 @@ fn sizes(plan: &EffectList) -> String {
     )
 }
 
-/// Seconds as people write them.
+/// Formats a duration in seconds as ms, s, min or h.
 pub fn duration(seconds: f64) -> String {
     if seconds < 1.0 {
         format!("{:.0} ms", seconds * 1e3)

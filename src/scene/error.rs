@@ -1,4 +1,4 @@
-//! Errors in scene files, with the place they point at and what to do about them.
+//! This module defines errors in scene files, with their position in the file and a remedy.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -8,17 +8,17 @@ use thiserror::Error;
 
 use super::load::SceneSource;
 
-/// Most errors reported at once.
+/// Largest number of errors reported at once.
 pub(super) const MAX_ERRORS: usize = 8;
-/// Longest message that is shown; what hostile input adds beyond is cut.
+/// Longest message that is shown, bytes; longer messages (from hostile input) are cut.
 const MAX_MESSAGE: usize = 600;
-/// Longest source line that is drawn; errors in longer ones only name the position.
+/// Longest source line that is shown, bytes; errors in longer lines only name the position.
 const MAX_LINE: usize = 400;
 
-/// Something wrong with a scene: what, where, and the remedy.
+/// An error in a scene: message, position and remedy.
 ///
-/// Made where the fault is noticed; [`SceneError::with_source`] adds file name and text, so that
-/// `miette` shows the line and [`SceneError::one_line`] names it.
+/// It is created where the fault is found. [`SceneError::with_source`] adds file name and text, so
+/// that `miette` shows the line and [`SceneError::one_line`] names it.
 #[derive(Clone, Debug, Diagnostic, Error)]
 #[error("{message}")]
 #[diagnostic(code(grainscope::scene))]
@@ -37,9 +37,9 @@ pub struct SceneError {
     related: Vec<SceneError>,
 }
 
-/// What an error can point at: a value of the scene or a byte range of its text.
+/// Something that an error can point at: a value of the scene or a byte range of its text.
 pub trait Place {
-    /// Bytes of the source text, unless made without one.
+    /// Byte range in the source text; `None` for values that come from no text.
     fn place(&self) -> Option<Range<usize>>;
 }
 
@@ -56,12 +56,12 @@ impl<P: Place> Place for Option<P> {
 }
 
 impl SceneError {
-    /// An error that points nowhere.
+    /// An error without a position.
     pub fn new(message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
         Self::at(&None::<Range<usize>>, message, help)
     }
 
-    /// An error that points at a value or a byte range; an empty `help` is left out.
+    /// An error at a value or a byte range; an empty `help` is omitted.
     pub fn at(place: &impl Place, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
         let help = help.as_ref();
         SceneError {
@@ -81,7 +81,7 @@ impl SceneError {
         self
     }
 
-    /// Adds file name and text, here and to all related errors that have none yet.
+    /// Adds file name and text to this error and to all related errors that have none yet.
     pub fn with_source(mut self, source: &SceneSource) -> Self {
         if self.place.is_none() {
             self.locate(source);
@@ -100,7 +100,7 @@ impl SceneError {
         let start = text.floor_char_boundary(span.offset());
         let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
         let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
-        // What spans several lines is shown by the first of them.
+        // Only the first line of a span over several lines is marked.
         let end = text.floor_char_boundary(span.offset().saturating_add(span.len()));
         self.span = Some((start..end.clamp(start, line_end)).into());
         let line = text[..start].matches('\n').count();
@@ -116,7 +116,8 @@ impl SceneError {
         self.place = Some(place.into());
     }
 
-    /// The first of several errors, with the next few as related ones; `Ok` if there are none.
+    /// Returns the first of several errors, with the next few as related errors; `Ok` if there are
+    /// none.
     pub fn join(errors: impl IntoIterator<Item = SceneError>) -> Result<(), SceneError> {
         let mut errors = errors.into_iter();
         let Some(mut first) = errors.next() else {
@@ -126,17 +127,17 @@ impl SceneError {
         Err(first)
     }
 
-    /// What is wrong.
+    /// The message that says what is wrong.
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// The remedy.
+    /// The remedy, if there is one.
     pub fn remedy(&self) -> Option<&str> {
         self.help.as_deref()
     }
 
-    /// The bytes of the source text it points at.
+    /// Byte range in the source text that the error points at.
     pub fn span(&self) -> Option<Range<usize>> {
         self.span.map(|s| s.offset()..s.offset() + s.len())
     }
@@ -165,7 +166,7 @@ impl SceneError {
     }
 }
 
-/// The candidate most like a mistyped name, if any is like it.
+/// The candidate most similar to a mistyped name; `None` if no candidate is similar enough.
 pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if name.len() > 100 {
         return None;
@@ -180,7 +181,7 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(c, _)| c)
 }
 
-/// `did you mean ...? <what> are: ...`, as far as it applies.
+/// The text `did you mean ...? <what>: ...`, as far as it applies.
 pub(super) fn suggestion(name: &str, what: &str, candidates: &[&str]) -> String {
     let mut text = closest(name, candidates.iter().copied())
         .map(|c| format!("did you mean `{c}`? "))
@@ -195,7 +196,7 @@ pub(super) fn suggestion(name: &str, what: &str, candidates: &[&str]) -> String 
     text
 }
 
-/// The text with control characters masked and cut to a length fit to print.
+/// The text with control characters masked, and shortened to at most [`MAX_MESSAGE`] bytes.
 fn printable(text: &str) -> String {
     let shown = text.get(..text.floor_char_boundary(MAX_MESSAGE)).unwrap_or_default();
     let ellipsis = if shown.len() < text.len() { "..." } else { "" };

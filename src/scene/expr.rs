@@ -1,8 +1,10 @@
-//! Arithmetic expressions over named numbers and the coordinates `x` and `y`.
+//! This module parses and evaluates arithmetic expressions over named numbers and the coordinates
+//! `x` and `y`.
 //!
-//! `exmex` folds and evaluates. Its own grammar binds `-` tighter than `^`, reads `^` from the
-//! left, takes names apart (`minimum`) and misreads nested commas, so a text is read here first
-//! and handed on with values for names and all parentheses written out.
+//! The crate `exmex` folds constants and evaluates. Its own grammar gives `-` a higher precedence
+//! than `^`, makes `^` left-associative, splits names (`minimum`) and misreads nested commas. The
+//! text is therefore parsed here first, and passed to `exmex` with values in place of names and
+//! with all parentheses.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -19,7 +21,7 @@ pub const MAX_DEPTH: usize = 64;
 type Unary = fn(f64) -> f64;
 type Binary = fn(f64, f64) -> f64;
 
-/// Functions of one argument, and the sign.
+/// Functions of one argument, and the negative sign.
 const UNARY: [(&str, Unary); 16] = [
     ("sqrt", f64::sqrt),
     ("abs", f64::abs),
@@ -39,17 +41,17 @@ const UNARY: [(&str, Unary); 16] = [
     ("-", |a| -a),
 ];
 
-/// Functions of two arguments. `min` and `max` hand on not-a-number.
+/// Functions of two arguments. `min` and `max` return NaN if an argument is NaN.
 const BINARY: [(&str, Binary); 3] = [
     ("min", |a, b| if a < b || a.is_nan() { a } else { b }),
     ("max", |a, b| if a > b || a.is_nan() { a } else { b }),
     ("atan2", f64::atan2),
 ];
 
-/// An operator between two operands: its text, how tight it binds, what it does.
+/// An operator between two operands: its text, its precedence and its function.
 type Infix = (&'static str, u8, Binary);
 
-/// Operators; of two that start alike the longer comes first.
+/// Operators between two operands. If one is the beginning of another, the longer comes first.
 const INFIX: [Infix; 11] = [
     ("||", 1, |a, b| truth(a != 0.0 || b != 0.0)),
     ("&&", 2, |a, b| truth(a != 0.0 && b != 0.0)),
@@ -67,7 +69,7 @@ const COMPARISON: u8 = 3;
 const SIGN: u8 = 6;
 const POWER: u8 = 7;
 
-/// Names that are always defined.
+/// Constants that are always defined.
 const CONSTANTS: [(&str, f64); 2] = [("pi", std::f64::consts::PI), ("PI", std::f64::consts::PI)];
 
 fn truth(yes: bool) -> f64 {
@@ -80,19 +82,19 @@ pub fn builtin_names() -> impl Iterator<Item = &'static str> {
     unary.chain(BINARY.iter().map(|(name, _)| *name)).chain(CONSTANTS.iter().map(|(name, _)| *name))
 }
 
-/// Whether the text can be a name in expressions.
+/// Whether the text is a valid name in expressions.
 pub fn is_name(text: &str) -> bool {
     !text.is_empty() && name_length(text) == text.len()
 }
 
-/// What is wrong with an expression, where in it, and the remedy.
+/// An error in an expression: message, remedy and position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExprError {
-    /// What is wrong.
+    /// Message that says what is wrong.
     pub message: String,
-    /// The remedy; may be empty.
+    /// Remedy; may be empty.
     pub help: String,
-    /// Bytes of the expression.
+    /// Byte range of the error in the expression.
     pub at: Range<usize>,
 }
 
@@ -101,7 +103,7 @@ struct Operators;
 
 impl MakeOperators<f64> for Operators {
     fn make<'a>() -> Vec<Operator<'a, f64>> {
-        // Everything is in parentheses: priorities do not matter.
+        // All operations are in parentheses, so priorities do not matter.
         let bin = |apply| BinOp { apply, prio: 0, is_commutative: false };
         let infix =
             INFIX.iter().map(|&(text, _, apply)| match UNARY.iter().find(|u| u.0 == text) {
@@ -134,15 +136,15 @@ struct Inner {
 }
 
 impl PartialEq for Expr {
-    /// Equal if they read the same once names are replaced by their values.
+    /// Two expressions are equal if their texts are equal after names are replaced by values.
     fn eq(&self, other: &Self) -> bool {
         self.0.flat.unparse() == other.0.flat.unparse()
     }
 }
 
 impl Expr {
-    /// Reads an expression; `names` are the numbers it may refer to, `x` and `y` only if
-    /// `coordinates`.
+    /// Parses an expression. `names` gives the values of the names that it may use, and `known`
+    /// lists them for messages. It may use `x` and `y` only if `coordinates` is true.
     pub fn parse<'a>(
         text: &str,
         names: &'a dyn Fn(&str) -> Option<f64>,
@@ -174,12 +176,12 @@ impl Expr {
         Ok(Expr(Arc::new(Inner { flat, uses: reader.uses })))
     }
 
-    /// Whether the value depends on `x` or `y`.
+    /// Whether the value does not depend on `x` or `y`.
     pub fn is_constant(&self) -> bool {
         self.0.uses == [false; 2]
     }
 
-    /// The value at a point; not a number where undefined.
+    /// The value at a point (m); NaN where the expression is undefined.
     pub fn at(&self, x: f64, y: f64) -> f64 {
         let Inner { flat, uses } = &*self.0;
         match uses {
@@ -194,7 +196,7 @@ impl Expr {
 
 const OPERATORS: &str = "operators are + - * / ^ < > <= >= && ||";
 
-/// Reads the grammar and writes it back for `exmex`.
+/// Parser that rewrites an expression for `exmex`.
 struct Reader<'t, 'a> {
     text: &'t str,
     pos: usize,
@@ -234,7 +236,7 @@ impl<'t> Reader<'t, '_> {
         found
     }
 
-    /// What stands in parentheses, after a sign or in a power.
+    /// Parses an expression in parentheses, after a sign or in an exponent.
     fn nested(&mut self, tightness: u8) -> Result<String, ExprError> {
         self.depth += 1;
         if self.depth > MAX_DEPTH {
@@ -246,7 +248,7 @@ impl<'t> Reader<'t, '_> {
         Ok(inner)
     }
 
-    /// Operands and operators that bind at least as tight as `tightness`.
+    /// Parses operands and operators whose precedence is at least `tightness`.
     fn expression(&mut self, tightness: u8) -> Result<String, ExprError> {
         let mut left = self.operand()?;
         let mut compared = false;
@@ -258,7 +260,7 @@ impl<'t> Reader<'t, '_> {
                 return Err(self.error("comparisons cannot be chained", help, token.len()));
             }
             self.eat(token);
-            // The right side of a power may have a sign and further powers.
+            // The exponent of a power may have a sign and further powers.
             let right = match tight {
                 POWER => self.nested(SIGN)?,
                 _ => self.expression(tight + 1)?,
@@ -268,7 +270,7 @@ impl<'t> Reader<'t, '_> {
         Ok(left)
     }
 
-    /// A number, name, call, sign or parenthesis.
+    /// Parses a number, a name, a call, or an operand with a sign or in parentheses.
     fn operand(&mut self) -> Result<String, ExprError> {
         self.skip_space();
         let rest = self.rest();
@@ -316,14 +318,15 @@ impl<'t> Reader<'t, '_> {
         Ok(value)
     }
 
-    /// What is in parentheses that were just opened; `opened` is the text from there on.
+    /// Parses up to the `)` of a parenthesis that was just opened; `opened` is the text from its
+    /// `(`.
     fn until_closed(&mut self, opened: &str) -> Result<String, ExprError> {
         let inner = self.nested(0)?;
         self.close(opened)?;
         Ok(inner)
     }
 
-    /// Eats `)`, else points at the `(` that `opened` has.
+    /// Consumes `)`; if the text ends before it, the error points at the `(` in `opened`.
     fn close(&mut self, opened: &str) -> Result<(), ExprError> {
         if self.eat(")") {
             return Ok(());
@@ -389,12 +392,12 @@ fn is_constant(name: &str) -> bool {
     CONSTANTS.iter().any(|c| c.0 == name)
 }
 
-/// A number as `exmex` is to read it.
+/// A number in the notation that `exmex` reads.
 fn literal(value: f64) -> String {
     if value.is_sign_negative() { format!("(-({:e}))", -value) } else { format!("{value:e}") }
 }
 
-/// Bytes of the unsigned number the text starts with, such as `2`, `.5`, `2.5E-6`.
+/// Length in bytes of the unsigned number at the start of the text, such as `2`, `.5`, `2.5E-6`.
 fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
     let digits = |from: usize| bytes.iter().skip(from).take_while(|b| b.is_ascii_digit()).count();
@@ -417,7 +420,7 @@ fn number_length(text: &str) -> usize {
     end
 }
 
-/// Bytes of the name the text starts with.
+/// Length in bytes of the name at the start of the text.
 fn name_length(text: &str) -> usize {
     if text.starts_with(|c: char| c.is_ascii_digit()) {
         return 0;
@@ -563,7 +566,7 @@ mod tests {
         assert!(parse(&long).is_err_and(|e| e.message.contains("more than 2000")));
     }
 
-    /// A random expression with as few parentheses as the grammar needs, and its value.
+    /// A random expression with as few parentheses as the grammar requires, and its value.
     fn random_expression(random: &mut impl FnMut(usize) -> usize, depth: usize) -> (String, f64) {
         let wrapped = |(text, value): (String, f64)| (format!("({text})"), value);
         if depth == 0 || random(8) == 0 {

@@ -1,4 +1,4 @@
-//! From the text of a scene to a [`Scene`] and back.
+//! This module reads the text of a scene into a [`Scene`] and writes a [`Scene`] as text.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -18,12 +18,12 @@ use super::types::Scene;
 /// The version of the scene format that this program reads.
 pub const SCHEMA: u32 = 1;
 
-/// Largest scene file, bytes.
+/// Size of the largest scene file, bytes.
 const MAX_BYTES: usize = 1 << 20;
-/// Largest text in which more than the first syntax error is looked for.
+/// Size of the largest text in which more than the first syntax error is searched for, bytes.
 const MAX_RECOVER: usize = 1 << 16;
 
-/// The text of a scene and where it is from; cheap to clone.
+/// The text of a scene and the name of its source; cheap to clone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneSource {
     name: Arc<str>,
@@ -31,7 +31,7 @@ pub struct SceneSource {
 }
 
 impl SceneSource {
-    /// A text and its name.
+    /// A source with the given name and text.
     pub fn new(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Self {
         SceneSource { name: name.into(), text: text.into() }
     }
@@ -41,13 +41,14 @@ impl SceneSource {
         &self.name
     }
 
-    /// The TOML.
+    /// The TOML text.
     pub fn text(&self) -> &str {
         &self.text
     }
 }
 
-/// Reads a scene file; refuses what cannot be one before it is parsed.
+/// Reads a scene file without parsing it. Directories and files that are too large, empty or not
+/// UTF-8 are refused.
 pub fn load(path: impl AsRef<Path>) -> Result<SceneSource, SceneError> {
     let path = path.as_ref();
     let name = path.display().to_string();
@@ -81,7 +82,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<SceneSource, SceneError> {
     Ok(SceneSource::new(name, text))
 }
 
-/// Reads a scene; reports several errors at once where one does not cause the next.
+/// Parses a scene; independent errors are reported together.
 pub fn parse(source: &SceneSource) -> Result<Scene, SceneError> {
     read(source).map_err(|error| error.with_source(source))
 }
@@ -103,7 +104,7 @@ fn read(source: &SceneSource) -> Result<Scene, SceneError> {
             }
             Err(e) => {
                 errors.push(translate(&e));
-                // Go on after a mistyped word, as if it were what was meant.
+                // Replace a mistyped word by the word that was meant, and continue.
                 let mut words = quoted(e.message());
                 let meant = closest(words.next().unwrap_or_default(), words);
                 let repaired = e.span().is_some_and(|s| repair(root.get_mut(), &s, meant));
@@ -117,7 +118,7 @@ fn read(source: &SceneSource) -> Result<Scene, SceneError> {
     }
 }
 
-/// Reports lists that are longer than what was read of them: serde overlooks that.
+/// Reports lists that are longer than expected: serde ignores the surplus values.
 fn unread_in_table(table: &DeTable, read: &toml::Table, errors: &mut Vec<SceneError>) {
     for (key, value) in table {
         if let Some(read) = read.get(key.get_ref().as_ref()) {
@@ -143,7 +144,7 @@ fn unread(value: &Spanned<DeValue>, read: &toml::Value, errors: &mut Vec<SceneEr
     }
 }
 
-/// The TOML as a table, or its syntax errors, at most one a line.
+/// The TOML text as a table, or its syntax errors, at most one per line.
 pub(super) fn table(source: &SceneSource) -> Result<Spanned<DeTable<'_>>, SceneError> {
     let text = source.text();
     let first = match DeTable::parse(text) {
@@ -171,7 +172,7 @@ fn syntax(e: &toml::de::Error) -> SceneError {
         m if m.contains("string values must be quoted") => {
             "put words and expressions in quotes: \"2 * alpha\""
         }
-        m if m.contains("recurs") => "a scene needs no such nesting",
+        m if m.contains("recurs") => "a scene needs no such deep nesting",
         _ => "check the TOML syntax: key = value, [table], [[list]], \"text\"",
     };
     SceneError::at(&e.span(), format!("not TOML: {}", e.message()), help)
@@ -194,8 +195,8 @@ fn check_schema(root: &Spanned<DeTable>) -> Result<(), SceneError> {
     }
 }
 
-/// Replaces the key or text at a place in the table by what was meant; takes the key out if that
-/// is not known.
+/// Replaces the key or string at `span` by `meant`. If `meant` is `None`, a key is removed. Returns
+/// whether something was changed.
 fn repair(table: &mut DeTable, span: &Range<usize>, meant: Option<&str>) -> bool {
     let key = table.keys().find(|key| key.span() == *span).map(|key| key.get_ref().to_string());
     let Some(key) = key else {
@@ -223,12 +224,12 @@ fn repair_in(value: &mut Spanned<DeValue>, span: &Range<usize>, meant: Option<&s
     }
 }
 
-/// The words in backticks.
+/// The words of a message that are in backticks.
 fn quoted(message: &str) -> impl Iterator<Item = &str> {
     message.split('`').skip(1).step_by(2)
 }
 
-/// What serde says, in the words of scene files.
+/// Translates a message of serde into the terms of scene files.
 fn translate(e: &toml::de::Error) -> SceneError {
     let said = e.message();
     let shown = e.to_string();
@@ -269,7 +270,7 @@ fn translate(e: &toml::de::Error) -> SceneError {
     SceneError::at(&e.span(), message, help).with_label(label)
 }
 
-/// Rust's names of types, in plain words.
+/// Describes a Rust type in plain words.
 fn plain(wanted: &str) -> String {
     match wanted {
         "u32" | "u64" | "usize" => "a whole number, 0 or more".into(),
@@ -285,13 +286,13 @@ fn plain(wanted: &str) -> String {
     }
 }
 
-/// The scene with every default written out; [`parse`] reads it back to an equal scene.
+/// The scene as TOML with every default written out; [`parse`] reads it back to an equal scene.
 pub fn to_toml(scene: &Scene) -> String {
     // Cannot fail for a scene that was parsed.
     toml::to_string(scene).unwrap_or_else(|e| format!("# not a scene: {e}\n"))
 }
 
-/// Names a scene by what it says: SHA-256 of [`to_toml`], in hexadecimal digits.
+/// Identifier of a scene's content: the SHA-256 hash of [`to_toml`], in hexadecimal digits.
 pub fn scene_hash(scene: &Scene) -> String {
     Sha256::digest(to_toml(scene)).iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -334,7 +335,8 @@ mod tests {
         format!("s.toml:{}:{column}: ", before.matches('\n').count() + 1)
     }
 
-    /// What is replaced in the silo, by what, where the error is in that, its message and help.
+    /// Columns: text of the silo, its replacement, position of the error in the replacement,
+    /// message, help.
     const FAULTS: &str = r#"
         density = 1e6 | dnsity = 1 | dnsity | unknown key `dnsity` | did you mean `density`?
         "down" | "dwn" | "dwn" | unknown choice `dwn` | did you mean `down`?
@@ -444,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_is_no_scene_file() {
+    fn files_that_are_not_scenes_are_refused() {
         let folder = crate::testing::TempFolder::new().expect("temporary folder");
         let file = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);

@@ -1,9 +1,9 @@
-//! Scene files: what a run computes, as TOML.
+//! This module reads scene files: TOML texts that define what a run computes.
 //!
-//! [`types`] is the format. A [`SceneSource`] is a text with a name, from a file ([`load()`]) or a
-//! preset ([`presets::find`]); [`SceneSource::with_sets`] edits it, [`parse`] reads it into a
-//! [`Scene`]. Values are [`Quantity`]s and [`Field`]s, evaluated in the [`Scope`] of the scene's
-//! parameters. All faults are [`SceneError`]s, which know file, line, column and remedy.
+//! [`types`] defines the format. A [`SceneSource`] is a text with a name, from a file ([`load()`])
+//! or a preset ([`presets::find`]). [`SceneSource::with_sets`] edits the text, and [`parse`] reads
+//! it into a [`Scene`]. Values are [`Quantity`]s and [`Field`]s, evaluated in the [`Scope`] of the
+//! scene's parameters. Every error is a [`SceneError`] with file, line, column and remedy.
 
 pub mod error;
 pub mod expr;

@@ -1,9 +1,9 @@
-//! Scenes that come with the program.
+//! This module contains the preset scenes of the program.
 
 use super::error::{SceneError, suggestion};
 use super::load::{SceneSource, parse};
 
-/// Names and texts.
+/// Names and TOML texts of the presets.
 const PRESETS: [(&str, &str); 10] = [
     ("silo", include_str!("../../presets/silo.toml")),
     ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
@@ -17,7 +17,7 @@ const PRESETS: [(&str, &str); 10] = [
     ("layer_stack", include_str!("../../presets/layer_stack.toml")),
 ];
 
-/// Names and one-line descriptions, in the order to show them.
+/// Names and one-line descriptions of the presets, in display order.
 pub fn list() -> Vec<(&'static str, String)> {
     let description = |name, text| {
         parse(&SceneSource::new(name, text)).map(|scene| scene.description).unwrap_or_default()
@@ -25,7 +25,7 @@ pub fn list() -> Vec<(&'static str, String)> {
     PRESETS.iter().map(|&(name, text)| (name, description(name, text))).collect()
 }
 
-/// The preset of a name.
+/// The preset with the given name; the error suggests a similar name.
 pub fn find(name: &str) -> Result<SceneSource, SceneError> {
     match PRESETS.iter().find(|preset| preset.0 == name) {
         Some((name, text)) => Ok(SceneSource::new(*name, *text)),

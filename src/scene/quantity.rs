@@ -1,4 +1,5 @@
-//! Values of a scene file: numbers, or expressions over the scene's parameters.
+//! This module reads the values of a scene file: numbers, or expressions over the scene's
+//! parameters.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -19,9 +20,9 @@ pub type Quantity = Value<false>;
 /// A number, or an expression over the scene's parameters and the coordinates `x` and `y`.
 pub type Field = Value<true>;
 
-/// A number or an expression; `XY` says whether it may use the coordinates.
+/// A number or an expression; `XY` states whether it may use the coordinates.
 ///
-/// Equal if written the same, wherever that is.
+/// Two values are equal if they are written the same; their place in the file does not matter.
 #[derive(Clone, Debug)]
 pub struct Value<const XY: bool> {
     raw: Raw,
@@ -35,29 +36,31 @@ enum Raw {
 }
 
 impl<const XY: bool> Value<XY> {
-    /// A number that stands in no file.
+    /// A number that comes from no scene file.
     pub fn number(value: f64) -> Self {
         Value { raw: Raw::Number(value), span: None }
     }
 
-    /// An expression that stands in no file.
+    /// An expression that comes from no scene file.
     pub fn expression(text: impl Into<Box<str>>) -> Self {
         Value { raw: Raw::Text(text.into()), span: None }
     }
 
-    /// Its bytes in the scene's text, quotes included.
+    /// Byte range of the value in the scene's text, quotes included; `None` if it comes from no
+    /// file.
     pub fn span(&self) -> Option<Range<usize>> {
         self.span.clone()
     }
 
-    /// Reads the expression with the parameters' values.
+    /// Compiles the expression with the values of the parameters.
     fn read(&self, text: &str, scope: &Scope) -> Result<Expr, SceneError> {
         let known = || scope.iter().map(|(name, _)| name).collect();
         Expr::parse(text, &|name| scope.get(name), &known, XY)
             .map_err(|error| self.fault(text, &error))
     }
 
-    /// Points at the part of the expression that is wrong, unless escapes hide where that is.
+    /// The error with the position of the faulty part of the expression, or of the whole value if
+    /// it contains escape sequences.
     fn fault(&self, text: &str, error: &ExprError) -> SceneError {
         let exact = self.span().filter(|s| s.len() == text.len() + 2);
         let place = match exact {
@@ -67,7 +70,7 @@ impl<const XY: bool> Value<XY> {
         SceneError::at(&place, format!("{} in {}", error.message, self.shown()), &error.help)
     }
 
-    /// As written, cut to a length fit for a message.
+    /// The value as written, shortened to fit into a message.
     fn shown(&self) -> String {
         let text = self.to_string();
         match text.char_indices().nth(80) {
@@ -88,7 +91,7 @@ impl<const XY: bool> Value<XY> {
 }
 
 impl Value<false> {
-    /// The value, given the parameters; finite.
+    /// The finite value for the given parameters; fails if the expression is invalid or not finite.
     pub fn eval(&self, scope: &Scope) -> Result<f64, SceneError> {
         match &self.raw {
             Raw::Number(value) => self.finite(*value),
@@ -98,7 +101,8 @@ impl Value<false> {
 }
 
 impl Value<true> {
-    /// The function of `x` and `y`, given the parameters; finite where it is constant.
+    /// The function of `x` and `y` for the given parameters; fails if the expression is invalid, or
+    /// constant and not finite.
     pub fn compile(&self, scope: &Scope) -> Result<FieldFn, SceneError> {
         let expr = match &self.raw {
             Raw::Number(value) => return Ok(FieldFn::Constant(self.finite(*value)?)),
@@ -113,7 +117,7 @@ impl Value<true> {
 }
 
 impl From<Quantity> for Field {
-    /// The same number or expression; it may now use the coordinates, and does not.
+    /// The same number or expression as a field that does not use the coordinates.
     fn from(q: Quantity) -> Field {
         Value { raw: q.raw, span: q.span }
     }
@@ -122,9 +126,9 @@ impl From<Quantity> for Field {
 /// A compiled [`Field`]; cheap to clone.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FieldFn {
-    /// The same everywhere.
+    /// A value that is the same everywhere.
     Constant(f64),
-    /// Depends on the place.
+    /// An expression that depends on the position.
     Varying(Expr),
 }
 
@@ -137,7 +141,7 @@ impl FieldFn {
         }
     }
 
-    /// The value at a point; not a number or infinite where the expression is undefined.
+    /// The value at a point (m); NaN or infinite where the expression is undefined.
     pub fn at(&self, x: f64, y: f64) -> f64 {
         match self {
             FieldFn::Constant(value) => *value,
@@ -303,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_depend_on_the_place() {
+    fn fields_depend_on_the_position() {
         let field = Field::expression("alpha*x + y^2").compile(&scope()).expect("valid");
         assert_eq!(field.constant(), None);
         assert_eq!(field.at(2.0, 3.0), 10.0);

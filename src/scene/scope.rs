@@ -1,4 +1,4 @@
-//! The values of a scene's parameters.
+//! This module evaluates the parameters of a scene.
 
 use indexmap::IndexMap;
 
@@ -6,21 +6,21 @@ use super::error::{MAX_ERRORS, SceneError};
 use super::expr;
 use super::types::{Parameter, Scene};
 
-/// The named numbers that expressions may use, in the order of the scene file.
+/// Values of the parameters that expressions may use, in the order of the scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scope {
     values: IndexMap<Box<str>, f64>,
 }
 
 impl Scope {
-    /// Evaluates the scene's parameters, each of which may use those above it, and checks names
-    /// and ranges. Reports all that are wrong at once.
+    /// Evaluates the scene's parameters and checks their names and ranges. A parameter may use the
+    /// parameters above it. Several errors are reported at once.
     pub fn new(scene: &Scene) -> Result<Scope, SceneError> {
         Self::with_overrides(scene, |_| None)
     }
 
-    /// As [`Scope::new`], with some parameters set from outside (a schedule, a slider); those
-    /// that depend on them follow.
+    /// Like [`Scope::new`], but `overrides` gives the values of some parameters (from a schedule or
+    /// a slider). Parameters that depend on them change too.
     pub fn with_overrides(
         scene: &Scene,
         overrides: impl Fn(&str) -> Option<f64>,
@@ -37,7 +37,7 @@ impl Scope {
                 Ok(value) => _ = scope.values.insert(name.as_str().into(), value),
                 Err(error) => {
                     errors.push(error);
-                    // Let those below it complain only of their own.
+                    // Parameters below this one report only their own errors.
                     let value = parameter.default.eval(&scope).unwrap_or(1.0);
                     scope.values.insert(name.as_str().into(), value);
                 }
@@ -47,17 +47,17 @@ impl Scope {
         Ok(scope)
     }
 
-    /// A scope of given values.
+    /// A scope with the given names and values.
     pub fn from_values<'a>(values: impl IntoIterator<Item = (&'a str, f64)>) -> Scope {
         Scope { values: values.into_iter().map(|(name, value)| (name.into(), value)).collect() }
     }
 
-    /// The value of a parameter.
+    /// The value of a parameter; `None` if there is no such parameter.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied()
     }
 
-    /// Names and values in the order of the scene file.
+    /// Names and values of the parameters, in the order of the scene file.
     pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
         self.values.iter().map(|(name, value)| (&**name, *value))
     }

@@ -1,11 +1,12 @@
-//! `--set`: changes of single values of a scene's text that leave the rest as it is.
+//! This module implements `--set`, which changes single values in the text of a scene and leaves
+//! the rest of the text unchanged.
 
 use toml_edit::{DocumentMut, InlineTable, Item, Table, Value};
 
 use super::error::{SceneError, suggestion};
 use super::load::{SceneSource, table};
 
-/// The keys of a scene, as the first part of a path.
+/// The keys of a scene with which a path may start.
 const KEYS: [&str; 21] = [
     "schema",
     "name",
@@ -30,7 +31,7 @@ const KEYS: [&str; 21] = [
     "schedule",
 ];
 
-/// Most keys in a path; the format nests less.
+/// Largest number of keys in a path; the format has fewer levels.
 const MAX_STEPS: usize = 12;
 
 /// One part of a path such as `walls[1].kind`.
@@ -43,9 +44,9 @@ enum Step {
 impl SceneSource {
     /// The scene with `name=value` or `path.to.key=value` applied in order.
     ///
-    /// A bare name is a parameter, whose `value` is set. The value is TOML if it reads as such
-    /// (number, truth value, array, quoted string, inline table), else a string: an expression
-    /// or the word of a choice. Comments and order of the text stay.
+    /// A name without dots is a parameter, whose `value` is set. The value is read as TOML if it is
+    /// valid TOML (number, boolean, array, quoted string, inline table), otherwise as a string: an
+    /// expression or the name of a choice. The comments and the order of the text are kept.
     pub fn with_sets(&self, sets: &[String]) -> Result<SceneSource, SceneError> {
         if sets.is_empty() {
             return Ok(self.clone());
@@ -127,7 +128,7 @@ fn names(root: &Item, table: &str) -> Vec<String> {
     table.map(|t| t.iter().map(|(name, _)| name.to_owned()).collect()).unwrap_or_default()
 }
 
-/// Walks along the path, making tables that are missing, and writes the value.
+/// Follows the path, creates missing tables, and writes the value.
 fn write(root: &mut Item, steps: &[Step], text: &str) -> Result<(), Fault> {
     let mut item = root;
     let mut walked = String::new();
@@ -188,7 +189,7 @@ fn write(root: &mut Item, steps: &[Step], text: &str) -> Result<(), Fault> {
     }
 }
 
-/// TOML if it reads as such, else a string.
+/// The text as a TOML value if it is valid TOML (but no date or time), otherwise as a string.
 fn read_value(text: &str) -> Value {
     match text.parse::<Value>() {
         Ok(mut value) if !value.is_datetime() => {
@@ -199,7 +200,7 @@ fn read_value(text: &str) -> Value {
     }
 }
 
-/// Keys joined by dots, each with any number of indices; keys may be quoted.
+/// Reads a path: keys joined by dots, each with any number of indices; keys may be quoted.
 fn read_path(path: &str) -> Option<Vec<Step>> {
     let mut steps = vec![];
     let mut rest = path;

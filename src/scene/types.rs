@@ -1,8 +1,8 @@
-//! What a scene file may say, as types.
+//! This module defines the format of scene files as Rust types.
 //!
-//! Every struct mirrors one TOML table; unknown keys are refused. A [`Quantity`] is a number or
-//! an arithmetic expression over the scene's parameters; a [`Field`] may also use the coordinates
-//! `x` and `y` (SI units). Nothing here is checked for sense: that happens in `plan`.
+//! Every struct corresponds to one TOML table; unknown keys are refused. A [`Quantity`] is a number
+//! or an arithmetic expression over the scene's parameters; a [`Field`] may also use the
+//! coordinates `x` and `y` (SI units). The values are not checked here; `plan` checks them.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -10,74 +10,90 @@ use serde::{Deserialize, Serialize};
 
 use super::quantity::{Field, Quantity};
 
-/// A whole scene file (`schema = 1`). All values in SI units, x to the right, y up.
+/// A scene file (`schema = 1`). All values are in SI units; x points to the right, y up.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Version of the scene format; 1.
     pub schema: u32,
-    /// Name of the scene; names the run folder and the recording. Letters, digits, `_`, `-`.
+    /// Name of the scene, used for the run folder and the recording. Letters, digits, `_`, `-`.
     pub name: String,
-    /// One line that says what the scene shows.
+    /// Description of the scene in one line.
     #[serde(default)]
     pub description: String,
-    /// Acceleration of gravity, m/s2.
+    /// Gravitational acceleration along x and y, m/s2.
     #[serde(default = "zero_pair")]
     pub gravity: [Quantity; 2],
-    /// Named numbers that other values refer to; `--set name=value` and the explorer set them.
+    /// Named numbers that expressions may use; `--set name=value` and the explorer change them.
     #[serde(default)]
     pub parameters: IndexMap<String, Parameter>,
+    /// The rectangle that is meshed.
     pub domain: Domain,
+    /// Settings of the mesh lines.
     #[serde(default)]
     pub mesh: Mesh,
+    /// Settings that determine the accuracy.
     #[serde(default)]
     pub accuracy: Accuracy,
+    /// End time and limits of the time step.
     pub time: Time,
+    /// Materials by name.
     pub materials: IndexMap<String, Material>,
-    /// Painted in order: where regions overlap the later one wins.
+    /// Regions that are filled with materials at the start; where they overlap, the last one
+    /// counts.
     pub regions: Vec<Region>,
+    /// Boundary conditions at the four sides of the domain.
     #[serde(default)]
     pub boundaries: Boundaries,
+    /// Thin walls inside the domain.
     #[serde(default)]
     pub walls: Vec<Wall>,
+    /// Solid rectangles inside the domain.
     #[serde(default)]
     pub blocks: Vec<Block>,
-    /// A force and couple per volume fixed in space, beside gravity.
+    /// Force and couple per volume, fixed in space, in addition to gravity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_force: Option<BodyForce>,
-    /// An acceleration fixed in space, beside gravity: it acts on whatever density is there.
+    /// Acceleration fixed in space, in addition to gravity; it acts on the local density.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub acceleration: Option<Acceleration>,
+    /// Gauges that measure the volume of a material that crosses a segment.
     #[serde(default)]
     pub gauges: Vec<Gauge>,
+    /// Dye lines and marked particles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dye: Option<Dye>,
-    /// What the run is made for; `grainscope cost` prices its accuracy. Default: the volume through
-    /// the first gauge at the end; without gauges the velocity at the end.
+    /// Quantity whose error is measured by `grainscope cost`. Default: the volume through the first
+    /// gauge at the end; without gauges the velocity at the end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interest: Option<Interest>,
+    /// Contents and appearance of the recording.
     #[serde(default)]
     pub recording: Recording,
-    /// Changes of materials, gravity or parameters while the run goes on.
+    /// Changes of materials, gravity or parameters during the run.
     #[serde(default)]
     pub schedule: Vec<Change>,
 }
 
-/// A named number with what a slider needs to know.
+/// A named number with its range, label and unit.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
-    /// Value unless `value` is given; may use parameters defined above.
+    /// Value used if `value` is not given; may use the parameters defined above.
     pub default: Quantity,
-    /// What `--set name=value` wrote.
+    /// Value that `--set name=value` has set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<Quantity>,
+    /// Smallest allowed value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<Quantity>,
+    /// Largest allowed value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max: Option<Quantity>,
+    /// Label of the slider in the explorer; default: the name.
     #[serde(default)]
     pub label: String,
+    /// Unit, for display only.
     #[serde(default)]
     pub unit: String,
 }
@@ -86,45 +102,51 @@ pub struct Parameter {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Domain {
+    /// Range along x, m: lower and upper end.
     pub x: [Quantity; 2],
+    /// Range along y, m: lower and upper end.
     pub y: [Quantity; 2],
-    /// The length that `accuracy.cells` divides, m; default: the shorter side.
+    /// Length that contains `accuracy.cells` cells, m; default: the shorter side of the domain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length_scale: Option<Quantity>,
 }
 
-/// Where mesh lines go beyond those that walls, apertures, blocks and gauges demand.
+/// Mesh lines in addition to those that walls, apertures, blocks and gauges require.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
-    /// Places where cells are made smaller. Absent: towards ends of walls that face each other
-    /// across a gap, by a factor of 12; `[]`: nowhere.
+    /// Positions towards which cells become smaller. Absent: the ends of walls that face each other
+    /// across a gap, by a factor of 12; `[]`: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grading: Option<Vec<Grading>>,
-    /// Largest ratio of neighbouring cells in graded parts.
+    /// Largest size ratio of neighbouring cells in graded parts.
     #[serde(default = "growth_default")]
     pub growth: f64,
-    /// Further coordinates that mesh lines must meet, m.
+    /// Additional x coordinates of mesh lines, m.
     #[serde(default)]
     pub lines_x: Vec<Quantity>,
+    /// Additional y coordinates of mesh lines, m.
     #[serde(default)]
     pub lines_y: Vec<Quantity>,
 }
 
+/// A position towards which cells become smaller.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grading {
+    /// Position towards which cells become smaller.
     pub towards: GradingTarget,
-    /// Cells there are smaller by this factor.
+    /// Factor by which the cells there are smaller.
     pub factor: Quantity,
 }
 
+/// A position towards which the mesh is graded.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GradingTarget {
-    /// The ends of inner walls that face each other across a gap; where none do, all free ends.
+    /// The ends of inner walls that face each other across a gap; if there are none, all free ends.
     Apertures,
-    /// All no-slip boundaries and those with a given rotation.
+    /// All no-slip walls and sides, and sides with a given tangential velocity or rotation.
     Walls,
     /// A coordinate x, m.
     X(Quantity),
@@ -132,39 +154,42 @@ pub enum GradingTarget {
     Y(Quantity),
 }
 
-/// A material. Cosserat if it has a coupling viscosity and an internal length (or couple
-/// viscosity) above zero; layered if it has a layer viscosity; else an isotropic Stokes fluid.
+/// A material. It is a Cosserat material if it has a coupling viscosity and an internal length (or
+/// couple viscosity) above zero, layered if it has a layer viscosity, and otherwise an isotropic
+/// Stokes fluid.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// kg/m3; may depend on x and y, and is then carried by the particles.
+    /// Density, kg/m3; may depend on x and y, and is then carried by the particles.
     #[serde(default = "zero_field")]
     pub density: Field,
-    /// eta, Pa s; may depend on x and y, and is then carried by the particles.
+    /// Shear viscosity eta, Pa s; may depend on x and y, and is then carried by the particles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear_viscosity: Option<Field>,
-    /// B, Pa s; absent: incompressible.
+    /// Bulk viscosity B, Pa s; absent: incompressible.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bulk_viscosity: Option<Quantity>,
-    /// eta_c, Pa s.
+    /// Coupling viscosity eta_c, Pa s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupling_viscosity: Option<Quantity>,
-    /// R, m, with M = 2 eta_c R^2.
+    /// Internal length R, m, with M = 2 eta_c R^2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub internal_length: Option<Quantity>,
-    /// M, Pa s m2, instead of an internal length.
+    /// Couple viscosity M, Pa s m2, instead of an internal length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub couple_viscosity: Option<Quantity>,
-    /// eta_s, Pa s: viscosity of shear along the layers, whose normal is the director.
+    /// Viscosity eta_s of shear along the layers, whose normal is the director, Pa s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layer_viscosity: Option<Quantity>,
-    /// Viscosities from contacts between grains, instead of giving them.
+    /// Contact parameters of grains from which the viscosities are computed, instead of giving
+    /// them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub granular: Option<Granular>,
-    /// Fills what the regions leave free; carries no history and is not drawn.
+    /// Whether the material fills the part of the domain outside all regions; such a material
+    /// carries no history and is not drawn.
     #[serde(default)]
     pub background: bool,
-    /// Colour in pictures, `#rrggbb`; default from a colour-blind safe palette.
+    /// Colour in pictures, `#rrggbb`; default: from a palette for colour-blind readers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colour: Option<String>,
 }
@@ -173,126 +198,159 @@ pub struct Material {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Granular {
-    /// n, 0 to 1.
+    /// Porosity n, 0 to 1.
     pub porosity: Quantity,
-    /// k, contacts per grain.
+    /// Coordination number k, contacts per grain.
     pub coordination: Quantity,
-    /// eta_n, Pa s.
+    /// Viscosity eta_n of a contact in the normal direction, Pa s.
     pub normal_dashpot: Quantity,
-    /// eta_m, Pa s.
+    /// Viscosity eta_m of a contact in the tangential direction, Pa s.
     pub tangential_dashpot: Quantity,
-    /// `false`: B from (16); `true` (default): incompressible.
+    /// `true` (default): incompressible; `false`: bulk viscosity B from equation (16).
     #[serde(default = "yes")]
     pub incompressible: bool,
 }
 
-/// A part of the domain and the material that fills it at first.
+/// A part of the domain and the material that fills it at the start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
+    /// Name of the material.
     pub material: String,
+    /// Shape of the region.
     #[serde(default)]
     pub shape: Shape,
-    /// Director of a layered material.
+    /// Initial directors; required for a layered material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub director: Option<Director>,
 }
 
+/// Shape of a region.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
     /// The whole domain.
     #[default]
     Everywhere,
+    /// An axis-aligned rectangle.
     Rectangle {
+        /// Range along x, m: lower and upper end.
         x: [Quantity; 2],
+        /// Range along y, m: lower and upper end.
         y: [Quantity; 2],
     },
+    /// A circle.
     Circle {
+        /// Coordinates x and y of the centre, m.
         centre: [Quantity; 2],
+        /// Radius, m.
         radius: Quantity,
     },
-    /// Where the expression in x and y is above zero (comparisons give 1 or 0).
+    /// The points where the expression in x and y is above zero (comparisons give 1 or 0).
     Where(Field),
 }
 
+/// Initial directors of a layered material.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Director {
-    /// Angle of the layer normal to the x axis, degrees, in x and y.
+    /// Angle between the layer normal and the x axis, degrees; may depend on x and y.
     AngleDegrees(Field),
-    /// Uniform in all directions, spread evenly over neighbouring particles, from
-    /// `accuracy.seed`.
+    /// Random directions, uniformly distributed over all angles and evenly over neighbouring
+    /// particles; seeded by `accuracy.seed`.
     Random,
 }
 
+/// Boundary conditions at the four sides of the domain.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundaries {
+    /// Left side.
     #[serde(default)]
     pub left: Boundary,
+    /// Right side.
     #[serde(default)]
     pub right: Boundary,
+    /// Lower side.
     #[serde(default)]
     pub bottom: Boundary,
+    /// Upper side.
     #[serde(default)]
     pub top: Boundary,
 }
 
-/// A side of the domain: `kind` gives a start, the other keys override it.
+impl Boundaries {
+    /// The four sides: left, right, bottom, top.
+    pub fn sides(&self) -> [&Boundary; 4] {
+        [&self.left, &self.right, &self.bottom, &self.top]
+    }
+}
+
+/// Boundary conditions at a side of the domain: `kind` sets defaults that the other keys override.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
+    /// Kind of boundary condition.
     #[serde(default)]
     pub kind: BoundaryKind,
-    /// Given velocity, m/s (expressions may use x and y).
+    /// Prescribed velocity along x, m/s; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_x: Option<Field>,
+    /// Prescribed velocity along y, m/s; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_y: Option<Field>,
-    /// Given traction on the fluid, Pa; excludes the velocity of the same direction.
+    /// Prescribed traction on the fluid along x, Pa; excludes `velocity_x`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub traction_x: Option<Field>,
+    /// Prescribed traction on the fluid along y, Pa; excludes `velocity_y`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub traction_y: Option<Field>,
-    /// Given Cosserat rotation rate, 1/s; absent: free (no couple).
+    /// Prescribed Cosserat rotation rate, 1/s; absent: free (no couple).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Field>,
 }
 
+/// Kinds of boundary conditions at a side of the domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BoundaryKind {
-    /// No normal velocity, no tangential traction.
+    /// Zero normal velocity and zero tangential traction.
     #[default]
     FreeSlip,
-    /// No velocity.
+    /// Zero velocity.
     NoSlip,
-    /// No traction.
+    /// Zero traction.
     Open,
-    /// Joined to the opposite side, which must say the same.
+    /// Joined to the opposite side, which must also be periodic.
     Periodic,
 }
 
-/// A thin wall along a mesh line, between two points with one common coordinate.
+/// A thin wall along a mesh line between two points that have one coordinate in common.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
+    /// Name of the wall.
     pub name: String,
+    /// Coordinates x and y of one end, m.
     pub from: [Quantity; 2],
+    /// Coordinates x and y of the other end, m.
     pub to: [Quantity; 2],
+    /// Kind of boundary condition on both faces.
     #[serde(default)]
     pub kind: WallKind,
-    /// Given rotation on it, 1/s; absent: free.
+    /// Prescribed Cosserat rotation rate on the wall, 1/s; absent: free (no couple).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Quantity>,
 }
 
+/// Kinds of boundary conditions at walls and blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WallKind {
+    /// Zero normal velocity and zero tangential traction.
     #[default]
     FreeSlip,
+    /// Zero velocity.
     NoSlip,
 }
 
@@ -300,272 +358,328 @@ pub enum WallKind {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
+    /// Name of the block.
     pub name: String,
+    /// Range along x, m: lower and upper end.
     pub x: [Quantity; 2],
+    /// Range along y, m: lower and upper end.
     pub y: [Quantity; 2],
+    /// Kind of boundary condition on its faces.
     #[serde(default)]
     pub kind: WallKind,
 }
 
+/// Force and couple per volume, fixed in space.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyForce {
-    /// N/m3, in x and y.
+    /// Force per volume along x, N/m3; may depend on x and y.
     #[serde(default = "zero_field")]
     pub x: Field,
+    /// Force per volume along y, N/m3; may depend on x and y.
     #[serde(default = "zero_field")]
     pub y: Field,
-    /// N m/m3, acts on the Cosserat rotation.
+    /// Couple per volume, N m/m3, which acts on the Cosserat rotation; may depend on x and y.
     #[serde(default = "zero_field")]
     pub couple: Field,
 }
 
+/// Acceleration fixed in space.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Acceleration {
-    /// m/s2, in x and y.
+    /// Acceleration along x, m/s2; may depend on x and y.
     #[serde(default = "zero_field")]
     pub x: Field,
+    /// Acceleration along y, m/s2; may depend on x and y.
     #[serde(default = "zero_field")]
     pub y: Field,
 }
 
-/// A segment along a mesh line that counts a material crossing it along `direction`.
+/// A segment along a mesh line that measures the volume of a material that crosses it.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gauge {
+    /// Name of the gauge.
     pub name: String,
+    /// Coordinates x and y of one end, m.
     pub from: [Quantity; 2],
+    /// Coordinates x and y of the other end, m.
     pub to: [Quantity; 2],
+    /// Direction in which crossing counts as positive.
     pub direction: Direction,
+    /// Name of the material that is measured.
     pub material: String,
 }
 
-/// The quantity whose error counts, how that error is measured, and below what it does not matter.
+/// Quantity whose error is measured, and how the error is measured.
 ///
-/// The error is `|q - q_ref| / max(|q_ref|, floor)`, with `|.|` the norm over the domain for a
+/// The error is `|q - q_ref| / max(|q_ref|, floor)`, where `|.|` is the norm over the domain for a
 /// field and the magnitude for a number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interest {
+    /// Quantity whose error is measured.
     pub quantity: Interesting,
+    /// Instant at which the quantity is evaluated.
     #[serde(default)]
     pub at: Moment,
+    /// Norm used for fields.
     #[serde(default)]
     pub norm: Norm,
-    /// In the quantity's unit: errors are relative to no less than this.
+    /// Smallest reference value for the relative error, in the unit of the quantity.
     #[serde(default = "zero")]
     pub floor: Quantity,
 }
 
-/// What an accuracy may be asked of.
+/// Quantities whose error can be measured.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Interesting {
-    /// Volume that a gauge has counted, m2, by the gauge's name.
+    /// Volume that has crossed the gauge with this name, m2.
     Gauge(String),
-    /// Rate at which a gauge counts, m2/s.
+    /// Rate at which volume crosses the gauge with this name, m2/s.
     Rate(String),
-    /// m/s
+    /// Root-mean-square speed over the domain, m/s.
     RmsSpeed,
-    /// m/s
+    /// Largest speed, m/s.
     MaxSpeed,
     /// Mean |n_x| of the directors.
     Alignment,
-    /// W/m
+    /// Dissipated power, W/m.
     Dissipation,
-    /// The field, m/s.
+    /// Velocity field, m/s.
     Velocity,
-    /// The field of the Cosserat rotation, 1/s.
+    /// Field of the Cosserat rotation rate, 1/s.
     Rotation,
-    /// The field, Pa; up to a constant where no side is open.
+    /// Pressure field, Pa; defined up to a constant if no side is open.
     Pressure,
 }
 
-/// When the quantity is read.
+/// Instant at which a quantity is evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Moment {
-    /// With the first solution.
+    /// Time of the first solution.
     Start,
+    /// End of the run.
     #[default]
     End,
-    /// Its largest magnitude over the run; only of numbers.
+    /// Time of the largest magnitude during the run; not available for fields.
     Peak,
 }
 
-/// How large a field is.
+/// Norm of a field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Norm {
     /// Root mean square over the domain.
     #[default]
     L2,
-    /// Largest magnitude.
+    /// Largest magnitude in the domain.
     Max,
 }
 
+/// Directions along the coordinate axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
+    /// Along negative x.
     Left,
+    /// Along positive x.
     Right,
+    /// Along negative y.
     Down,
+    /// Along positive y.
     Up,
 }
 
-/// Passive lines carried by the flow, and particles marked at the start.
+/// Passive lines that move with the flow, and particles that are marked at the start.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Dye {
+    /// Grid of dye lines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<DyeGrid>,
-    /// Single lines, each a list of points.
+    /// Single dye lines, each a list of points (x, y), m.
     #[serde(default)]
     pub lines: Vec<Vec<[Quantity; 2]>>,
-    /// Particles within `width/2` of a segment are drawn in another colour.
+    /// Segments; particles within `width/2` of one are drawn in another colour.
     #[serde(default)]
     pub marks: Vec<DyeMark>,
 }
 
-/// Lines at x = x0 + i spacing and y = y0 + j spacing inside a rectangle.
+/// Dye lines at x = x0 + i spacing and y = y0 + j spacing inside a rectangle.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DyeGrid {
+    /// Range along x, m: x0 and upper end.
     pub x: [Quantity; 2],
+    /// Range along y, m: y0 and upper end.
     pub y: [Quantity; 2],
+    /// Distance between lines, m.
     pub spacing: Quantity,
 }
 
+/// Segment whose particles are marked at the start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DyeMark {
+    /// Coordinates x and y of one end, m.
     pub from: [Quantity; 2],
+    /// Coordinates x and y of the other end, m.
     pub to: [Quantity; 2],
+    /// Width of the marked strip, m.
     pub width: Quantity,
 }
 
+/// End time and limits of the time step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
-    /// s
+    /// End time, s.
     pub end: Quantity,
-    /// Largest step, s.
+    /// Largest time step, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_step: Option<Quantity>,
-    /// Largest number of cells a particle crosses in a step; cells that grading made smaller count
-    /// less.
+    /// Largest number of cells that a particle crosses in a step (Courant number); cells made
+    /// smaller by grading count less.
     #[serde(default = "courant_default")]
     pub courant: f64,
-    /// Largest strain in a step.
+    /// Largest strain of layered material in a step.
     #[serde(default = "strain_default")]
     pub strain: f64,
 }
 
+/// Settings that determine the accuracy.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Accuracy {
-    /// Cells per `domain.length_scale`.
+    /// Number of cells per `domain.length_scale`.
     pub cells: u32,
-    /// Particles per cell at the start; a square number.
+    /// Number of particles per cell at the start; a square number.
     pub particles_per_cell: u32,
+    /// Positions of the particles at the start.
     pub placement: Placement,
+    /// Quadrature in cells.
     pub quadrature: Quadrature,
+    /// Time integration scheme.
     pub integrator: Integrator,
-    /// Share of the next step by which the load of a stable stratification (heavy below light) is
-    /// taken ahead, so that large steps do not slosh: 0.6 to 1; 0 switches it off. Acts only in
-    /// scenes with gravity and more than one density, and leaves the order in time as it is.
+    /// Fraction of the next step by which the load of a stable stratification (heavy below light)
+    /// is evaluated ahead, so that large steps do not oscillate: 0.6 to 1; 0 switches it off. It
+    /// acts only in scenes with gravity and more than one density, and does not change the order in
+    /// time.
     pub stabilisation: f64,
-    /// Of the solver: relative residual and divergence.
+    /// Tolerance of the solver for the relative residual and the relative divergence.
     pub tolerance: f64,
-    /// Corrections of the solver before it is declared not converged.
+    /// Largest number of corrections (iterations) before the solver reports no convergence.
     pub max_corrections: u32,
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
+/// Positions of the particles at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Placement {
-    /// Centres of subcells.
+    /// One particle at the centre of each subcell.
     Regular,
-    /// One particle at a random place in each subcell.
+    /// One particle at a random position in each subcell.
     Jittered,
-    /// Anywhere in the cell.
+    /// Random positions in the cell.
     Random,
 }
 
+/// Quadrature in cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quadrature {
-    /// Gauss points that see the local harmonic mixture of the cell's particles.
+    /// Gauss points with the local harmonic mixture of the cell's particles.
     Mixture,
-    /// The same, but in cells cut by two materials shear along the interface is in series,
-    /// stretch along it in parallel.
+    /// Like `mixture`, but in cells that contain an interface of two materials, shear along the
+    /// interface is in series and stretch along it in parallel.
     Laminate,
     /// Particles as the only integration points: the method of the source.
     Particles,
 }
 
+/// Time integration schemes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
-    /// One solution a step: velocity at the half step extrapolated from the last two.
+    /// One solution per step; the velocity at the half step is extrapolated from the last two.
     Extrapolated,
-    /// Two solutions a step: a second one at the half step.
+    /// Two solutions per step; the second one is at the half step.
     Midpoint,
-    /// One solution a step, first order.
+    /// One solution per step, first order in time.
     Euler,
 }
 
-/// What is written, and how it looks.
+/// Contents and appearance of the recording.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Recording {
-    /// Frames at equal intervals over the run, beside the first.
+    /// Number of frames at equal intervals over the run, in addition to the first.
     pub frames: u32,
-    /// Further times, s, that the run meets exactly and records.
+    /// Additional times of frames, s; the run steps to them exactly.
     pub times: Vec<Quantity>,
+    /// Quantity that colours the particles.
     pub colour_by: ColourBy,
-    /// Most particles written per frame; above it every k-th is, and the summary says so.
+    /// Largest number of particles per frame. If there are more, only every k-th one is written,
+    /// and the summary states this.
     pub max_particles: u32,
-    /// Grid fields written each frame.
+    /// Fields written on a grid in each frame.
     pub fields: Vec<FieldName>,
-    /// Director strokes across the domain's width.
+    /// Number of director strokes across the width of the domain.
     pub glyphs: u32,
 }
 
+/// Quantities that can colour the particles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ColourBy {
+    /// Material.
     Material,
+    /// Speed, m/s.
     Speed,
+    /// Cosserat rotation rate, 1/s.
     Rotation,
+    /// Pressure, Pa.
     Pressure,
+    /// Strain rate, 1/s.
     StrainRate,
+    /// Shear viscosity, Pa s.
     Viscosity,
-    /// |n_x| of the director.
+    /// Alignment |n_x| of the director.
     Alignment,
 }
 
+/// Fields that can be recorded on a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FieldName {
+    /// Speed, m/s.
     Speed,
+    /// Cosserat rotation rate, 1/s.
     Rotation,
+    /// Pressure, Pa.
     Pressure,
-    /// Mean |n_x|, with isolines.
+    /// Mean alignment |n_x| of the directors, with isolines.
     Alignment,
 }
 
-/// From a time on, or with the solution of a step, set keys: parameters by name, others by path.
+/// A scheduled change of values, which takes effect at a time or with the solution of a step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Change {
+    /// Time of the change, s; excludes `step`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<Quantity>,
+    /// Number of the step of the change; excludes `time`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step: Option<u64>,
-    /// `{ alpha = 0.5, "materials.grains.density" = 1e6, "gravity[1]" = -5 }`
+    /// New values: parameters by name, other keys by path, for example
+    /// `{ alpha = 0.5, "materials.grains.density" = 1e6, "gravity[1]" = -5 }`.
     pub set: IndexMap<String, Quantity>,
 }
 
@@ -613,8 +727,8 @@ fn zero() -> Quantity {
 fn zero_field() -> Field {
     Field::number(0.0)
 }
-/// On the silo, lips graded by 8, 1.6 takes a fifth fewer cells than 1.3 and changes the initial
-/// discharge by 0.03 %.
+/// In the silo with a grading factor of 8 at the aperture, a growth of 1.6 needs a fifth fewer
+/// cells than 1.3 and changes the initial discharge by 0.03 %.
 fn growth_default() -> f64 {
     1.5
 }

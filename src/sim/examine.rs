@@ -1,6 +1,6 @@
 //! Looking for what cannot be in the state of a run.
 
-use super::Simulation;
+use super::simulation::Simulation;
 use crate::space::mesh::Mesh;
 
 /// Powers that differ by this share of the larger are no solution: solutions at the usual

@@ -6,7 +6,7 @@
 
 use super::state::State;
 use super::{Fault, Run, SimError};
-use crate::solve::stokes::SolveError;
+use crate::solve::report::SolveError;
 
 /// What to do about a step that fails.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

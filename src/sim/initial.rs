@@ -64,7 +64,7 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
         let first = out.len();
         for (member, angle) in members.iter().zip(angles) {
             let position = mesh.from_reference(cell, member.r);
-            out.push(position, member.share * mesh.cell_area(cell), member.material);
+            out.push(position, member.share * mesh.cell_volume(cell), member.material);
             let last = out.len() - 1;
             let si = plan.si(position);
             let region = member.filling.map(|f| &plan.regions[f]);
@@ -94,7 +94,7 @@ fn places(plan: &Plan) -> Particles {
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let mut random = plan.method.seeding.random(cell);
         let positions = plan.method.seeding.positions(mesh, cell, &mut random);
-        let volume = mesh.cell_area(cell) / positions.len() as f64;
+        let volume = mesh.cell_volume(cell) / positions.len() as f64;
         positions.into_iter().for_each(|p| out.push(p, volume, 0));
     }
     out.sort(mesh);

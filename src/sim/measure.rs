@@ -1,11 +1,10 @@
 //! Diagnostics of a state.
 
-use super::Simulation;
 use super::clock::{Limiter, Speeds};
-use super::row::{GaugeRow, Phases, Row};
-use crate::plan::Plan;
-use crate::plan::material::Material;
-use crate::solve::element::{PointShape, Rates};
+use super::phases::Phases;
+use super::row::{GaugeRow, Measured, Row};
+use super::simulation::Simulation;
+use crate::solve::element::{PointShape, rates};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
@@ -18,39 +17,6 @@ use std::time::Instant;
 /// lips graded by 8, outflow at 0.7 ms was 4.077 in steps of four small cells (half a usual one)
 /// and 4.078 in steps of two, which are half as many again.
 const GRADED_ALLOWANCE: f64 = 8.0;
-
-/// The row before anything is known.
-pub fn empty_row(plan: &Plan) -> Row {
-    Row {
-        step: 0,
-        time: 0.0,
-        dt: 0.0,
-        dt_limiter: Limiter::Start,
-        wall: 0.0,
-        power_in: 0.0,
-        dissipation: 0.0,
-        stabilisation: 0.0,
-        power_error: 0.0,
-        divergence_error: 0.0,
-        volume_error: 0.0,
-        iterations: 0,
-        particles: 0,
-        max_speed: 0.0,
-        rms_speed: 0.0,
-        potential_energy: 0.0,
-        work: 0.0,
-        dissipated: 0.0,
-        director_error: 0.0,
-        alignment: None,
-        active_rotation: 0,
-        splits: 0,
-        merges: 0,
-        held: 0,
-        gauges: vec![],
-        drift: vec![0.0; plan.state.materials.len()],
-        seconds: Phases::default(),
-    }
-}
 
 /// What a unit velocity of each node crosses per unit time, in the smallest of its cells as they
 /// count; nothing where all are solid.
@@ -86,26 +52,13 @@ pub fn hash(p: &Particles) -> String {
     h.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// Volume mean of |n_x| over layered particles.
-fn mean_alignment(p: &Particles, materials: &[Material]) -> Option<f64> {
-    let directors = p.director.as_ref()?;
-    let (mut sum, mut volume) = (0.0, 0.0);
-    for (k, n) in directors.iter().enumerate() {
-        if materials[p.material[k] as usize].layer_viscosity.is_some() {
-            sum += p.volume[k] * n[0].abs();
-            volume += p.volume[k];
-        }
-    }
-    (volume > 0.0).then(|| sum / volume)
-}
-
 impl<const D: usize> Simulation<D> {
     /// What limits the next step.
     pub(super) fn speeds(&self) -> Speeds {
         let mesh = &self.plan.mesh;
         let centre = Shape::at([0.0; 2]);
         let materials = &self.matter.materials;
-        let layered = |m: usize| materials[m].layer_viscosity.is_some();
+        let layered = |m: usize| materials[m].law.is_layered();
         let velocity = &self.flow.velocity;
         let crossings = self.crossings(|node| [velocity[node][0], velocity[node][1]]);
         let mut speeds = Speeds { crossings, strain_rate: 0.0, relaxation: self.matter.relaxation };
@@ -113,10 +66,12 @@ impl<const D: usize> Simulation<D> {
             return speeds;
         }
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            if (0..materials.len()).any(|m| layered(m) && self.quadrature.fraction(cell, m) > 0.0) {
+            if (0..materials.len())
+                .any(|m| layered(m) && self.quadrature.composition().fraction(cell, m) > 0.0)
+            {
                 let [hx, hy] = mesh.cell_size(cell);
                 let nodal = self.flow.of_cell(mesh, cell);
-                let rates = Rates::new(&PointShape::new(&centre, [hx, hy]), &nodal);
+                let rates = rates(&PointShape::new(&centre, [hx, hy]), &nodal);
                 let spin = rates.relative_spin.abs();
                 let rate = (2.0 * rates.strain_squared()).sqrt() + spin;
                 speeds.strain_rate = speeds.strain_rate.max(rate);
@@ -137,7 +92,7 @@ impl<const D: usize> Simulation<D> {
     /// Projected area of a material over the volume of its particles.
     pub(super) fn projected_share(&self, material: usize) -> f64 {
         let volume = self.particles.volume_of(material);
-        let area = self.quadrature.projected_area(&self.plan.mesh, material);
+        let area = self.quadrature.composition().projected_area(&self.plan.mesh, material);
         if volume > 0.0 { area / volume } else { 0.0 }
     }
 
@@ -182,7 +137,7 @@ impl<const D: usize> Simulation<D> {
                 return [0.0; 2];
             }
             let volume: f64 = self.particles.volume[range].iter().sum();
-            [(volume / mesh.cell_area(cell) - 1.0).powi(2), 1.0]
+            [(volume / mesh.cell_volume(cell) - 1.0).powi(2), 1.0]
         });
         (sum / cells.max(1.0)).sqrt()
     }
@@ -200,8 +155,7 @@ impl<const D: usize> Simulation<D> {
         let plan = self.plan.clone();
         let u = &plan.units;
         let r = self.report;
-        let (power_in, dissipation) = (r.power_in * u.power(), r.dissipation * u.power());
-        let stabilisation = r.restoring * u.power();
+        let dissipation = r.dissipation * u.power();
         let other = self.other_power() * u.power();
         let dt_si = dt * u.time;
         let before = &self.row;
@@ -224,42 +178,26 @@ impl<const D: usize> Simulation<D> {
             rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
                 * u.area_rate(),
         }));
-        let director_error = self
-            .particles
-            .director
-            .iter()
-            .flatten()
-            .map(|n| (n[0].hypot(n[1]) - 1.0).abs())
-            .fold(0.0, f64::max);
-        let row = Row {
+        let measured = Measured {
+            plan: &plan,
+            units: u,
+            materials: &self.matter.materials,
+            particles: &self.particles,
+            report: &self.report,
+            count: self.count,
             step: self.step,
             time: self.si_time(),
             dt: dt_si,
-            dt_limiter: limiter,
-            wall: 0.0,
-            power_in,
-            dissipation,
-            stabilisation,
-            power_error: r.power_error(),
-            divergence_error: r.divergence,
-            volume_error: self.volume_error(),
+            limiter,
             iterations,
-            particles: self.particles.len(),
             max_speed: self.flow.max_speed() * u.velocity(),
             rms_speed: self.flow.rms_speed(&plan.mesh) * u.velocity(),
+            volume_error: self.volume_error(),
             potential_energy: self.potential_energy() * u.energy(),
             work,
             dissipated,
-            director_error,
-            alignment: mean_alignment(&self.particles, &self.matter.materials),
-            active_rotation: r.active_rotation,
-            splits: self.count.splits,
-            merges: self.count.merges,
-            held: self.count.held,
-            gauges,
-            drift,
-            seconds,
         };
+        let row = Row::measured(&measured, gauges, drift, seconds);
         self.last_other_power = other;
         self.row = row;
         seconds.diagnostics += phase.elapsed().as_secs_f64();

@@ -1,6 +1,6 @@
 //! What the recording shows of a state: particles, dye, strokes, fields and level lines, in SI.
 
-use super::Simulation;
+use super::simulation::Simulation;
 use crate::frame::{Arrows, GridField, Isoline, ParticleScalar, ParticleSnapshot, Picture};
 use crate::laws::director;
 use crate::plan::Plan;
@@ -261,7 +261,8 @@ impl<const D: usize> Simulation<D> {
     /// A Cosserat material fills some of a cell.
     fn rotates(&self, cell: usize) -> bool {
         (0..self.matter.materials.len()).any(|m| {
-            self.matter.materials[m].rotation.is_some() && self.quadrature.fraction(cell, m) > 0.0
+            self.matter.materials[m].law.rotation.is_some()
+                && self.quadrature.composition().fraction(cell, m) > 0.0
         })
     }
 
@@ -274,7 +275,7 @@ impl<const D: usize> Simulation<D> {
         let mut sum = vec![[0.0; 2]; raster.len()];
         for (p, n) in directors.iter().enumerate() {
             let m = &self.matter.materials[self.particles.material[p] as usize];
-            if m.layer_viscosity.is_some() {
+            if m.law.is_layered() {
                 let s = &mut sum[raster.index(self.particles.position[p])];
                 s[0] += self.particles.volume[p];
                 s[1] += self.particles.volume[p] * n[0].abs();
@@ -321,7 +322,7 @@ impl<const D: usize> Simulation<D> {
         let mut tensor = vec![[0.0; 3]; raster.len()];
         for (p, n) in directors.iter().enumerate() {
             let m = &self.matter.materials[self.particles.material[p] as usize];
-            if m.layer_viscosity.is_some() {
+            if m.law.is_layered() {
                 let t = &mut tensor[raster.index(self.particles.position[p])];
                 t[0] += n[0] * n[0];
                 t[1] += n[1] * n[1];

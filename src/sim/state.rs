@@ -6,8 +6,9 @@
 //! columns by name.
 
 use super::clock::Limiter;
-use super::row::{GaugeRow, Phases, Row};
-use super::{Before, Simulation};
+use super::phases::Phases;
+use super::row::{self, COLUMNS, GaugeRow, Row};
+use super::simulation::{Before, Simulation};
 use crate::space::flow::Flow;
 use crate::space::particles::Particles;
 use crate::space::population::Count;
@@ -210,106 +211,98 @@ fn load_particles(s: &State, like: &Particles, materials: usize) -> Result<Parti
     })
 }
 
+/// Columns of a row that the format keeps in one list of numbers, in this order. A column that the
+/// registry gains later is saved under its own name.
+const ROW_NUMBERS: [&str; 15] = [
+    "time",
+    "dt",
+    "wall",
+    "power_in",
+    "dissipation",
+    "stabilisation",
+    "power_error",
+    "divergence_error",
+    "volume_error",
+    "max_speed",
+    "rms_speed",
+    "potential_energy",
+    "work",
+    "dissipated",
+    "director_error",
+];
+
+/// The same for counts; the limiter is saved by its place in [`Limiter::ALL`].
+const ROW_COUNTS: [&str; 8] = [
+    "step",
+    "dt_limiter",
+    "iterations",
+    "particles",
+    "active_rotation",
+    "splits",
+    "merges",
+    "held",
+];
+
+/// The value of a column by name.
+fn of_row(row: &Row, name: &str) -> f64 {
+    COLUMNS.iter().find(|c| c.name == name).map_or(f64::NAN, |c| c.number(row))
+}
+
 fn save_row(row: &Row, s: &mut State) {
     let limiter = Limiter::ALL.iter().position(|&l| l == row.dt_limiter).unwrap_or(0);
-    s.put_counts(
-        "row.counts",
-        [
-            row.step,
-            limiter as u64,
-            u64::from(row.iterations),
-            row.particles as u64,
-            row.active_rotation as u64,
-            row.splits,
-            row.merges,
-            row.held,
-        ],
-    );
-    s.put_floats(
-        "row.numbers",
-        [
-            row.time,
-            row.dt,
-            row.wall,
-            row.power_in,
-            row.dissipation,
-            row.stabilisation,
-            row.power_error,
-            row.divergence_error,
-            row.volume_error,
-            row.max_speed,
-            row.rms_speed,
-            row.potential_energy,
-            row.work,
-            row.dissipated,
-            row.director_error,
-        ],
-    );
-    s.put_floats("row.alignment", row.alignment);
+    let count = |name| if name == "dt_limiter" { limiter as u64 } else { of_row(row, name) as u64 };
+    s.put_counts("row.counts", ROW_COUNTS.map(count));
+    s.put_floats("row.numbers", ROW_NUMBERS.map(|name| of_row(row, name)));
+    s.put_floats("row.alignment", row.mean_alignment);
+    for column in later_columns() {
+        s.put_floats(&format!("row.{}", column.name), [column.number(row)]);
+    }
     s.put_floats("row.gauges", row.gauges.iter().flat_map(|g| [g.volume, g.rate]));
     s.put_floats("row.drift", row.drift.iter().copied());
     save_phases("row.seconds", &row.seconds, s);
 }
 
+/// Columns that the first version of the format did not have.
+fn later_columns() -> impl Iterator<Item = &'static row::Column> {
+    let known = |c: &&row::Column| {
+        ROW_NUMBERS.contains(&c.name) || ROW_COUNTS.contains(&c.name) || c.name == "mean_alignment"
+    };
+    COLUMNS.iter().filter(move |c| !known(c))
+}
+
 fn load_row(s: &State, gauges: usize, materials: usize) -> Result<Row, StateError> {
-    let [step, limiter, iterations, particles, active_rotation, splits, merges, held] =
-        s.tally("row.counts")?;
-    let [
-        time,
-        dt,
-        wall,
-        power_in,
-        dissipation,
-        stabilisation,
-        power_error,
-        divergence_error,
-        volume_error,
-        max_speed,
-        rms_speed,
-        potential_energy,
-        work,
-        dissipated,
-        director_error,
-    ] = s.numbers("row.numbers")?;
+    let counts: [u64; 8] = s.tally("row.counts")?;
+    let numbers: [f64; 15] = s.numbers("row.numbers")?;
     let out_of_range =
         |name: &'static str, value: u64| StateError::Range { name, value: value.to_string() };
-    Ok(Row {
-        step,
-        time,
-        dt,
-        dt_limiter: *usize::try_from(limiter)
-            .ok()
-            .and_then(|k| Limiter::ALL.get(k))
-            .ok_or_else(|| out_of_range("row.counts (limiter)", limiter))?,
-        wall,
-        power_in,
-        dissipation,
-        stabilisation,
-        power_error,
-        divergence_error,
-        volume_error,
-        iterations: u32::try_from(iterations)
-            .map_err(|_| out_of_range("row.counts (iterations)", iterations))?,
-        particles: particles as usize,
-        max_speed,
-        rms_speed,
-        potential_energy,
-        work,
-        dissipated,
-        director_error,
-        alignment: s.floats("row.alignment")?.first().copied(),
-        active_rotation: active_rotation as usize,
-        splits,
-        merges,
-        held,
-        gauges: s
-            .tuples("row.gauges", gauges)?
-            .into_iter()
-            .map(|[volume, rate]| GaugeRow { volume, rate })
-            .collect(),
-        drift: s.exactly("row.drift", materials)?.to_vec(),
-        seconds: load_phases("row.seconds", s)?,
-    })
+    let limiter = usize::try_from(counts[1]).ok().and_then(|k| Limiter::ALL.get(k));
+    let limiter = limiter.ok_or_else(|| out_of_range("row.counts (limiter)", counts[1]))?;
+    let mut row = Row::empty(materials);
+    let mut set = |name: &str, text: &str| {
+        let column = COLUMNS.iter().find(|c| c.name == name);
+        column.is_none_or(|c| c.set(&mut row, text).is_ok())
+    };
+    for (name, value) in ROW_COUNTS.into_iter().zip(counts) {
+        let text = if name == "dt_limiter" { limiter.name().into() } else { value.to_string() };
+        if !set(name, &text) {
+            return Err(out_of_range("row.counts", value));
+        }
+    }
+    // Numbers are written such that they are read back to the last bit.
+    let list = ROW_NUMBERS.into_iter().zip(numbers);
+    let later = later_columns().map(|c| {
+        let value = s.try_floats(&format!("row.{}", c.name)).and_then(|v| v.first().copied());
+        (c.name, value.unwrap_or(f64::NAN))
+    });
+    list.chain(later).for_each(|(name, value)| {
+        set(name, &value.to_string());
+    });
+    row.mean_alignment = s.floats("row.alignment")?.first().copied();
+    let tuples = s.tuples("row.gauges", gauges)?;
+    row.gauges = tuples.into_iter().map(|[volume, rate]| GaugeRow { volume, rate }).collect();
+    row.drift = s.exactly("row.drift", materials)?.to_vec();
+    row.seconds = load_phases("row.seconds", s)?;
+    Ok(row)
 }
 
 /// Writes seconds by phase.
@@ -393,10 +386,10 @@ impl<const D: usize> Simulation<D> {
 
         particles.sort(mesh);
         self.matter = changes.last().map_or(&plan.state, |c| &c.state).clone();
-        self.quadrature.set_factors(factors);
+        self.quadrature.composition_mut().set_factors(factors);
         self.factors_of_points = factors.to_vec();
         self.quadrature
-            .update(mesh, &particles, &self.matter.materials, version)
+            .update(mesh, &particles, &self.matter.materials, version, &(&**mesh, &flow))
             .map_err(|e| StateError::Range { name: "particles.position", value: e.to_string() })?;
         self.particles = particles;
         self.flow = flow;

@@ -45,7 +45,7 @@
 //! 0.91 and 0.81 along the mesh, but 0.04 at 30 degrees.
 
 use super::element::PointShape;
-use super::interface::Interface;
+use crate::composition::interface::Interface;
 use crate::laws::point::{PointLaw, Sym2};
 use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
 
@@ -326,15 +326,16 @@ fn upper_solve<const R: usize>(l: &[[f64; R]; R], rows: &mut [Row; R]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::layered;
+    use crate::composition::features::Strip;
+    use crate::composition::interface::Surroundings;
+    use crate::laws::{director::Orientation, layered};
     use crate::scene::Placement;
-    use crate::solve::element::{LOCAL, Matrix, add_stiffness, mirror};
-    use crate::solve::interface::Surroundings;
-    use crate::solve::minority::Strip;
+    use crate::solve::element::{LOCAL, Matrix, mirror};
+    use crate::solve::terms::viscous::add_stiffness;
     use crate::space::mesh::{Axis, Mesh};
     use crate::space::particles::Particles;
     use crate::space::seeding::Seeding;
-    use nalgebra::{SMatrix, Vector2};
+    use nalgebra::SMatrix;
 
     const SIZE: [f64; 2] = [0.7, 1.3];
 
@@ -343,8 +344,7 @@ mod tests {
     }
 
     fn layered(eta: f64, eta_s: f64, angle: f64) -> PointLaw {
-        let s = layered::deviatoric(eta, eta_s, &Vector2::new(angle.cos(), angle.sin()));
-        let shear = Sym2 { a: s[(0, 0)], b: s[(1, 1)], c: s[(0, 1)] };
+        let shear = layered::shear(eta, eta_s, &Orientation::of([angle.cos(), angle.sin()]));
         PointLaw { shear, dilation: eta, ..PointLaw::default() }
     }
 

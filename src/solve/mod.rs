@@ -1,15 +1,17 @@
-//! Solving for velocity, rotation and pressure: integration points, element matrices, the
+//! Solving for velocity, rotation and pressure: integration points, terms, element matrices, the
 //! sparse factor, corrections.
 
-pub mod buoyancy;
+mod correction;
+pub mod density;
 pub mod element;
-pub mod interface;
+pub mod evaluate;
 pub mod laminate;
 pub mod matrices;
-pub mod minority;
 pub mod multifrontal;
+mod problem;
 pub mod quadrature;
-pub mod spin;
+pub mod report;
+mod residual;
 pub mod stokes;
 pub mod symbolic;
-pub mod weight;
+pub mod terms;

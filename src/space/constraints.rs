@@ -1,21 +1,23 @@
-//! Boundary conditions as the solver sees them: given nodal values, and what has no unique answer.
+//! This module defines the boundary conditions of the solver: prescribed nodal values, and the null
+//! spaces of the problem.
 
 use super::flow::Flow;
 use super::mesh::Mesh;
 use super::shape::{GAUSS_3X3, NODES};
 
-/// Given values of nodal unknowns, and the null spaces that remain.
+/// Prescribed values of nodal unknowns, and the null spaces that remain.
 #[derive(Clone, Debug)]
 pub struct Constraints<const D: usize> {
     fixed: Vec<[bool; D]>,
     value: Vec<[f64; D]>,
-    /// Directions in which the whole may drift: one node is held, then the mean is removed.
+    /// Directions (x, y) of free rigid translation: one node is fixed, then the mean is subtracted.
     free_translation: [bool; 2],
-    /// No boundary lets fluid out: only pressure differences are known.
+    /// Whether no boundary lets fluid out, so that the pressure is determined up to a constant.
     closed: bool,
 }
 
 impl<const D: usize> Constraints<D> {
+    /// No constraints on the nodes of a mesh.
     pub fn new(mesh: &Mesh) -> Self {
         Constraints {
             fixed: vec![[false; D]; mesh.nodes()],
@@ -25,21 +27,23 @@ impl<const D: usize> Constraints<D> {
         }
     }
 
-    /// Prescribes component `c` of a node unless an earlier call did; earlier wins.
+    /// Prescribes component `c` of a node, unless an earlier call has prescribed it.
     pub fn fix(&mut self, node: usize, c: usize, value: f64) {
         if !self.fixed[node][c] {
             self.fixed[node][c] = true;
             self.value[node][c] = value;
         }
     }
+    /// Whether component `c` of a node is prescribed.
     pub fn is_fixed(&self, node: usize, c: usize) -> bool {
         self.fixed[node][c]
     }
+    /// Prescribed value of component `c` of a node, if any.
     pub fn fixed_value(&self, node: usize, c: usize) -> Option<f64> {
         self.fixed[node][c].then_some(self.value[node][c])
     }
 
-    /// Declares that nothing holds component `c`: its mean velocity will be zero.
+    /// Declares a free rigid translation along `c`; its mean velocity will be zero.
     pub fn free_translation(&mut self, mesh: &Mesh, c: usize) {
         let node = (0..mesh.cells())
             .find(|&cell| !mesh.solid[cell])
@@ -47,11 +51,12 @@ impl<const D: usize> Constraints<D> {
         self.fix(node, c, 0.0);
         self.free_translation[c] = true;
     }
-    /// Declares that the pressure is known up to a constant.
+    /// Declares that the pressure is determined only up to a constant; its mean will be zero.
     pub fn close(&mut self) {
         self.closed = true;
     }
 
+    /// Sets the prescribed components to their values.
     pub fn impose(&self, velocity: &mut [[f64; D]]) {
         for ((u, fixed), value) in velocity.iter_mut().zip(&self.fixed).zip(&self.value) {
             for c in 0..D {
@@ -62,6 +67,7 @@ impl<const D: usize> Constraints<D> {
         }
     }
 
+    /// Sets the forces on prescribed components to zero.
     pub fn clear_fixed(&self, force: &mut [[f64; D]]) {
         for (f, fixed) in force.iter_mut().zip(&self.fixed) {
             for c in 0..D {
@@ -72,10 +78,11 @@ impl<const D: usize> Constraints<D> {
         }
     }
 
-    /// Mean velocity zero where the whole may drift, mean pressure zero where it floats.
+    /// Subtracts the mean velocity along free translations, and the mean pressure if it is
+    /// determined only up to a constant.
     pub fn remove_null_space(&self, mesh: &Mesh, flow: &mut Flow<D>) {
         let cells = || (0..mesh.cells()).filter(|&c| !mesh.solid[c]);
-        let area: f64 = cells().map(|c| mesh.cell_area(c)).sum();
+        let area: f64 = cells().map(|c| mesh.cell_volume(c)).sum();
         for c in (0..2).filter(|&c| self.free_translation[c]) {
             let mut mean = 0.0;
             for cell in cells() {
@@ -84,13 +91,13 @@ impl<const D: usize> Constraints<D> {
                     .iter()
                     .map(|g| g.weight * (0..NODES).map(|a| g.shape.n[a] * u[a][c]).sum::<f64>())
                     .sum();
-                mean += inside * mesh.cell_area(cell) / area;
+                mean += inside * mesh.cell_volume(cell) / area;
             }
             flow.velocity.iter_mut().for_each(|u| u[c] -= mean);
         }
         if self.closed {
             let mean: f64 =
-                cells().map(|c| flow.pressure[c][0] * mesh.cell_area(c)).sum::<f64>() / area;
+                cells().map(|c| flow.pressure[c][0] * mesh.cell_volume(c)).sum::<f64>() / area;
             cells().for_each(|c| flow.pressure[c][0] -= mean);
         }
     }

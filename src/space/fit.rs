@@ -1,38 +1,42 @@
-//! Weighted least squares of a polynomial in a cell, from values at scattered points.
+//! This module fits polynomials in a cell to values at scattered points by weighted least squares.
 //!
 //! ```text
 //! f(r) = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2,   u = (xi - mean xi)/deviation, v likewise
 //! ```
-//! minimises `sum w (f(r_k) - f_k)^2`. What the points do not determine is left out: the quadratic
-//! terms together, then a slope. Each fit keeps the weighted mean of its values, and reproduces
-//! polynomials of its degree wherever the points lie: so a field carried by particles is followed
-//! without the noise of their places. On a smooth density with jittered particles at n = 64 the
-//! velocity error is that of exact integration with a quadratic fit, 7 % more with a linear one,
-//! and a hundred times as large with sums over particles.
+//! minimises `sum w (f(r_k) - f_k)^2`. Terms that the points do not determine are omitted: first
+//! all quadratic terms, then a slope. Each fit keeps the weighted mean of its values and reproduces
+//! polynomials of its degree for any positions of the points, so a field carried by particles is
+//! represented without the noise of their positions. For a smooth density with jittered particles
+//! at n = 64, the velocity error with a quadratic fit equals that of exact integration; with a
+//! linear fit it is 7 % larger, and with sums over particles a hundred times as large.
 
-/// Quadratic terms need as many points, and as large a determinant of what of them is independent
-/// of the linear ones (0.41 for 4 x 4 regular points, 0 for two rows).
+/// Smallest number of points for quadratic terms.
 const LEAST_POINTS: usize = 8;
+/// Smallest determinant, for quadratic terms, of their part that is independent of the linear terms
+/// (0.41 for 4 x 4 regular points, 0 for two rows).
 const LEAST_DETERMINANT: f64 = 0.01;
-/// A slope needs this deviation (in half cells), and the second one this much of it that is
-/// independent of the first.
+/// Smallest standard deviation of the points, in half cells, for a slope.
 const LEAST_DEVIATION: f64 = 0.02;
+/// Smallest fraction of the variance that is independent of the first slope, for the second slope.
 const LEAST_INDEPENDENCE: f64 = 0.02;
 
 /// Highest degree that a fit may have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Degree {
+    /// Constant.
     #[default]
     Constant,
+    /// Linear terms.
     Linear,
+    /// Linear and quadratic terms.
     Quadratic,
 }
 
-/// Points with weights and values.
+/// Points with weights and values, to which a polynomial is fitted.
 #[derive(Clone, Debug, Default)]
 pub struct Fit {
     points: Vec<Valued>,
-    /// Points beyond these many were borrowed from neighbours.
+    /// Number of the cell's own points; the points after them are from neighbouring cells.
     own: usize,
 }
 
@@ -43,12 +47,13 @@ struct Valued {
     value: f64,
 }
 
-/// A fitted polynomial.
+/// A fitted polynomial in reference coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Polynomial {
+    /// Degree that the fit reached.
     pub degree: Degree,
     centre: [f64; 2],
-    /// One over the deviation; zero where there is none.
+    /// Inverse standard deviation of the points; zero if it is too small for a slope.
     stretch: [f64; 2],
     coefficient: [f64; 6],
     low: f64,
@@ -56,22 +61,25 @@ pub struct Polynomial {
 }
 
 impl Fit {
+    /// Removes all points.
     pub fn clear(&mut self) {
         self.points.clear();
         self.own = 0;
     }
 
+    /// Adds a point `r` of the cell (reference coordinates) with its weight and value.
     pub fn add(&mut self, weight: f64, r: [f64; 2], value: f64) {
         self.points.push(Valued { weight, r, value });
         self.own = self.points.len();
     }
 
-    /// Adds a point that does not count in the mean.
+    /// Adds a point of a neighbouring cell, which is not part of the mean that the fit keeps. Such
+    /// points must be added last.
     pub fn borrow(&mut self, weight: f64, r: [f64; 2], value: f64) {
         self.points.push(Valued { weight, r, value });
     }
 
-    /// The polynomial of at most this degree; `None` without points.
+    /// The fitted polynomial of at most the degree `most`; `None` without points.
     pub fn solve(&self, most: Degree) -> Option<Polynomial> {
         let total: f64 = self.points.iter().map(|p| p.weight).sum();
         if self.points.is_empty() || total.is_nan() || total <= 0.0 {
@@ -105,7 +113,8 @@ impl Fit {
         Some(out)
     }
 
-    /// Coefficients of a polynomial whose place and range are known; the degree reached.
+    /// Computes the coefficients of a polynomial whose centre, stretch and range are known; returns
+    /// the degree reached.
     fn fill(&self, out: &mut Polynomial, most: Degree, total: f64) -> Degree {
         // Normal equations of all six terms.
         let mut m = [[0.0; 6]; 6];
@@ -136,7 +145,7 @@ impl Fit {
         } else if vv == 0.0 {
             (b[1], 0.0)
         } else if 1.0 - uv * uv < LEAST_INDEPENDENCE {
-            // Points in a row: the slope along it.
+            // The points lie on a line: only the slope along it is determined.
             let along = 0.25 * (b[1] + uv.signum() * b[2]);
             (along, uv.signum() * along)
         } else {
@@ -148,7 +157,7 @@ impl Fit {
     }
 }
 
-/// Solves the normal equations; `None` where the quadratic terms are not determined.
+/// Solves the normal equations; `None` if the quadratic terms are not determined.
 fn solve_six(m: &[[f64; 6]; 6], b: &[f64; 6]) -> Option<[f64; 6]> {
     let mut l = [[0.0; 6]; 6];
     let mut determinant = 1.0;
@@ -190,13 +199,15 @@ impl Polynomial {
         [1.0, u, v, u * u, u * v, v * v]
     }
 
+    /// Value at a point `r` (reference coordinates).
     pub fn at(&self, r: [f64; 2]) -> f64 {
         self.terms(r).iter().zip(&self.coefficient).map(|(t, c)| t * c).sum()
     }
 
-    /// Kept near the range of the values it was fitted to: half of it beyond either end, which a
-    /// corner of the cell reaches when its points are at random places. Without that half, SolKz
-    /// with 16 random particles has three times the velocity error at 128 cells.
+    /// Value at a point, limited to the range of the fitted values extended by half of it at either
+    /// end. Corners of the cell reach this extension if the points have random positions. Without
+    /// the extension, SolKz with 16 random particles has three times the velocity error at 128
+    /// cells.
     pub fn at_bounded(&self, r: [f64; 2]) -> f64 {
         let margin = 0.5 * (self.high - self.low);
         self.at(r).clamp(self.low - margin, self.high + margin)
@@ -224,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn quadratics_are_reproduced_from_any_places() {
+    fn quadratics_are_reproduced_from_any_positions() {
         let f =
             |r: [f64; 2]| 3.0 - r[0] + 2.0 * r[1] + r[0] * r[0] - 0.5 * r[0] * r[1] + r[1].powi(2);
         let p = fit(scattered(16), f).solve(Degree::Quadratic).unwrap();
@@ -233,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn what_points_do_not_determine_is_left_out() {
+    fn terms_that_points_do_not_determine_are_omitted() {
         let f = |r: [f64; 2]| 1.0 + 2.0 * r[0] - 3.0 * r[1];
         let few = fit(scattered(4), f).solve(Degree::Quadratic).unwrap();
         assert_eq!(few.degree, Degree::Linear);

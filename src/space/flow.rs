@@ -1,24 +1,27 @@
-//! The unknowns: velocity (and rotation) at nodes, pressure in cells, and their interpolation.
+//! This module defines the unknowns (velocity and rotation at nodes, pressure in cells) and their
+//! interpolation.
 
 use super::mesh::Mesh;
 use super::shape::{GAUSS_3X3, NODES, Shape};
 use crate::threads;
 use nalgebra::Matrix2;
 
-/// Velocity (and rotation) at the mesh's nodes, pressure in its cells.
+/// Velocity (and rotation) at the nodes of the mesh and pressure in its cells, in the plan's units.
 #[derive(Clone, Debug, Default)]
 pub struct Flow<const D: usize> {
-    /// `u, v` (and `w`) per node.
+    /// Components `u, v` (and the rotation rate `w`) of each node.
     pub velocity: Vec<[f64; D]>,
-    /// Coefficients of `1, xi, eta` per cell.
+    /// Coefficients of the pressure basis `1, xi, eta` of each cell.
     pub pressure: Vec<[f64; 3]>,
 }
 
 impl<const D: usize> Flow<D> {
+    /// A flow at rest with zero pressure.
     pub fn zero(mesh: &Mesh) -> Self {
         Flow { velocity: vec![[0.0; D]; mesh.nodes()], pressure: vec![[0.0; 3]; mesh.cells()] }
     }
 
+    /// Velocity (and rotation) at the nine nodes of a cell.
     pub fn of_cell(&self, mesh: &Mesh, cell: usize) -> [[f64; D]; NODES] {
         mesh.cell_nodes(cell).map(|n| self.velocity[n])
     }
@@ -29,6 +32,7 @@ impl<const D: usize> Flow<D> {
         interpolate(&self.of_cell(mesh, cell), &Shape::values(mesh.to_reference(cell, p)))
     }
 
+    /// Pressure at a point.
     pub fn pressure_at(&self, mesh: &Mesh, p: [f64; 2]) -> f64 {
         let cell = mesh.locate(p);
         let [xi, eta] = mesh.to_reference(cell, p);
@@ -36,7 +40,7 @@ impl<const D: usize> Flow<D> {
         a + b * xi + c * eta
     }
 
-    /// Goes on by `share` of the change since an earlier flow.
+    /// Extrapolates: adds `share` times the change since an earlier flow.
     pub fn extrapolate(&mut self, earlier: &Flow<D>, share: f64) {
         let go_on = |now: &mut f64, before: &f64| *now += share * (*now - before);
         let velocity = self.velocity.as_flattened_mut().iter_mut();
@@ -45,23 +49,24 @@ impl<const D: usize> Flow<D> {
         pressure.zip(earlier.pressure.as_flattened()).for_each(|(now, before)| go_on(now, before));
     }
 
-    /// Becomes another flow, in the room that it has.
+    /// Copies another flow, reusing the allocated memory.
     pub fn copy_from(&mut self, other: &Flow<D>) {
         self.velocity.clone_from(&other.velocity);
         self.pressure.clone_from(&other.pressure);
     }
 
-    /// The velocity alone, for what moves with it.
+    /// Writes the velocity without the rotation to `out`.
     pub fn translation(&self, out: &mut Vec<[f64; 2]>) {
         out.clear();
         out.extend(self.velocity.iter().map(|u| [u[0], u[1]]));
     }
 
+    /// Largest nodal speed.
     pub fn max_speed(&self) -> f64 {
         self.velocity.iter().map(|u| u[0].hypot(u[1])).fold(0.0, f64::max)
     }
 
-    /// Root mean square of the speed over all cells that are not solid.
+    /// Root-mean-square speed over all cells that are not solid.
     pub fn rms_speed(&self, mesh: &Mesh) -> f64 {
         let [sum, area] = threads::sum(0..mesh.cells(), |cell| {
             if mesh.solid[cell] {
@@ -72,14 +77,14 @@ impl<const D: usize> Flow<D> {
                 let u = interpolate(&nodal, &g.shape.n);
                 g.weight * (u[0] * u[0] + u[1] * u[1])
             });
-            let area = mesh.cell_area(cell);
+            let area = mesh.cell_volume(cell);
             [area * squares.sum::<f64>(), area]
         });
         (sum / area).sqrt()
     }
 }
 
-/// Sum of nodal values weighted by shape functions.
+/// Interpolated value: sum of nodal values weighted by the shape functions `n`.
 pub fn interpolate<const D: usize>(nodal: &[[f64; D]; NODES], n: &[f64; NODES]) -> [f64; D] {
     let mut out = [0.0; D];
     for a in 0..NODES {
@@ -90,7 +95,7 @@ pub fn interpolate<const D: usize>(nodal: &[[f64; D]; NODES], n: &[f64; NODES]) 
     out
 }
 
-/// `L_ij = u_i,j` in a cell of size `[hx, hy]`.
+/// Velocity gradient `L_ij = u_i,j` at a point of a cell of size `[hx, hy]`.
 pub fn gradient(nodal: &[[f64; 2]; NODES], s: &Shape, [hx, hy]: [f64; 2]) -> Matrix2<f64> {
     let mut l = Matrix2::zeros();
     for a in 0..NODES {

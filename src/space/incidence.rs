@@ -1,25 +1,26 @@
-//! Which nodes a cell has, and which cells a node: what each cell computes for its nodes is added
-//! up node by node, always in the order of the cells.
+//! This module lists the nodes of each cell and the cells of each node. Contributions of cells to
+//! their nodes are summed node by node, always in the order of the cells.
 
 use super::mesh::Mesh;
 use super::shape::NODES;
 use crate::threads;
 
-/// Nodes that are worth a task of their own.
+/// Largest number of nodes per task.
 const GRAIN: usize = 2048;
 
-/// Cells and nodes of a mesh.
+/// Incidence of cells and nodes of a mesh.
 pub struct Incidence {
-    /// The nine nodes of every cell: finding them takes divisions.
+    /// The nine nodes of every cell, stored because computing them takes divisions.
     pub nodes: Vec<[usize; NODES]>,
-    /// Where each node's entries start.
+    /// Index of the first entry of each node.
     start: Vec<u32>,
-    /// `NODES cell + local node`, by node, cells ascending.
+    /// Entries `NODES cell + local node`, sorted by node, then by cell.
     entries: Vec<u32>,
 }
 
 impl Incidence {
-    /// Solid cells have nodes, but nodes do not have them.
+    /// Finds the nodes of all cells and the cells of all nodes; solid cells are not among the
+    /// latter.
     pub fn new(mesh: &Mesh) -> Self {
         let nodes: Vec<[usize; NODES]> = (0..mesh.cells()).map(|c| mesh.cell_nodes(c)).collect();
         let used = || (0..mesh.cells()).filter(|&c| !mesh.solid[c]);
@@ -39,13 +40,13 @@ impl Incidence {
         Incidence { nodes, start, entries }
     }
 
-    /// Cells of a node, and which of their nodes it is.
+    /// Cells of a node, each with the local number of the node in the cell.
     pub fn of_node(&self, node: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         let range = self.start[node] as usize..self.start[node + 1] as usize;
         self.entries[range].iter().map(|&e| (e as usize / NODES, e as usize % NODES))
     }
 
-    /// Adds to each node what its cells have for it: `of(cell, local node)`.
+    /// Adds the contributions `of(cell, local node)` of its cells to each node of `total`.
     pub fn add_up<const D: usize>(
         &self,
         total: &mut [[f64; D]],

@@ -1,40 +1,45 @@
-//! The fixed tensor-product mesh: two axes of mesh lines, nodes of the biquadratic element, cells.
+//! This module defines the fixed tensor-product mesh: two axes of mesh lines, the nodes of the
+//! biquadratic element, and the cells.
 
-/// Coordinates this near to a line, in cells, are on it: where a flow carries points along a line,
-/// rounding must not decide in which of two cells they are.
+use super::measure::{CellMeasure, Measure};
+
+/// Distance from a mesh line, in cell sizes, below which a point counts as on the line. When the
+/// flow moves points along a line, rounding must not decide which of two cells contains them.
 pub const ON_LINE: f64 = 1e-10;
 
-/// Points so far inside a cell, in half cells, are in it whatever rounding does.
+/// Largest reference coordinate at which a point is certainly inside the cell despite rounding.
 pub const INSIDE: f64 = 1.0 - 1e-9;
 
-/// A cell along one direction.
+/// Extent of a cell along one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Span {
+    /// Coordinate of the centre.
     pub centre: f64,
-    /// Reference coordinates per length.
+    /// Reference coordinate per length: 2 divided by the cell size.
     pub per_length: f64,
 }
 
 impl Span {
-    /// Reference coordinate: -1 to 1 inside.
+    /// Reference coordinate of `x`; -1 to 1 inside the cell.
     pub fn reference(&self, x: f64) -> f64 {
         (x - self.centre) * self.per_length
     }
 }
 
-/// Mesh lines along one direction, ascending; a periodic axis joins its last line to its first.
+/// Mesh lines along one direction, in ascending order; on a periodic axis the last line is
+/// identified with the first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     lines: Vec<f64>,
     periodic: bool,
     spans: Vec<Span>,
-    /// For uniform bins over the axis, the cell at the bin's start.
+    /// Cell at the start of each of the uniform bins over the axis.
     bins: Vec<u32>,
     bins_per_length: f64,
 }
 
 impl Axis {
-    /// `lines`: at least two, strictly ascending.
+    /// An axis with the given lines: at least two, strictly ascending.
     pub fn new(lines: Vec<f64>, periodic: bool) -> Self {
         debug_assert!(lines.len() >= 2 && lines.windows(2).all(|w| w[0] < w[1]));
         let length = lines[lines.len() - 1] - lines[0];
@@ -56,34 +61,43 @@ impl Axis {
         Axis { lines, periodic, spans, bins, bins_per_length }
     }
 
+    /// Coordinates of the mesh lines.
     pub fn lines(&self) -> &[f64] {
         &self.lines
     }
+    /// Whether the axis is periodic.
     pub fn periodic(&self) -> bool {
         self.periodic
     }
+    /// Coordinate of the first mesh line.
     pub fn start(&self) -> f64 {
         self.lines[0]
     }
+    /// Coordinate of the last mesh line.
     pub fn end(&self) -> f64 {
         self.lines[self.lines.len() - 1]
     }
+    /// Length of the axis.
     pub fn length(&self) -> f64 {
         self.end() - self.start()
     }
+    /// Number of cells.
     pub fn cells(&self) -> usize {
         self.lines.len() - 1
     }
-    /// Nodes of the quadratic element: mesh lines and midpoints.
+    /// Number of nodes of the quadratic element: mesh lines and midpoints.
     pub fn nodes(&self) -> usize {
         2 * self.cells() + usize::from(!self.periodic)
     }
+    /// Extent of a cell.
     pub fn span(&self, cell: usize) -> Span {
         self.spans[cell]
     }
+    /// Size of a cell.
     pub fn size(&self, cell: usize) -> f64 {
         self.lines[cell + 1] - self.lines[cell]
     }
+    /// Coordinate of a node.
     pub fn node_coordinate(&self, node: usize) -> f64 {
         if node.is_multiple_of(2) {
             self.lines[node / 2]
@@ -91,14 +105,14 @@ impl Axis {
             0.5 * (self.lines[node / 2] + self.lines[node / 2 + 1])
         }
     }
-    /// Node `a` (0, 1, 2) of a cell.
+    /// Index of the local node `a` (0, 1, 2) of a cell.
     pub fn cell_node(&self, cell: usize, a: usize) -> usize {
         let node = 2 * cell + a;
         if self.periodic && node == 2 * self.cells() { 0 } else { node }
     }
 
-    /// Cell that holds a coordinate; coordinates outside go to the nearest cell, one on a line
-    /// (or nearly, [`ON_LINE`]) to the cell above it.
+    /// Cell that contains a coordinate. Coordinates outside the axis belong to the nearest cell;
+    /// coordinates on a line (within [`ON_LINE`]) belong to the cell above it.
     pub fn locate(&self, x: f64) -> usize {
         let b = ((x - self.lines[0]) * self.bins_per_length) as usize;
         let mut cell = self.bins[b.min(self.bins.len() - 1)] as usize;
@@ -112,7 +126,7 @@ impl Axis {
         if on_next && cell + 2 < self.lines.len() { cell + 1 } else { cell }
     }
 
-    /// Brings a coordinate of a periodic axis back into it.
+    /// Maps a coordinate into the range of a periodic axis; does nothing on other axes.
     pub fn wrap(&self, x: f64) -> f64 {
         let end = self.end() - ON_LINE * self.size(self.cells() - 1);
         if !self.periodic || (x >= self.start() && x < end) {
@@ -136,65 +150,102 @@ impl Axis {
 /// Tensor-product mesh of rectangles. Cell `(i, j)` has index `j nx + i`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
+    /// Axis along x.
     pub x: Axis,
+    /// Axis along y.
     pub y: Axis,
-    /// Cells that are solid blocks; they carry nothing.
+    /// Whether each cell is part of a solid block; such cells contain no material.
     pub solid: Vec<bool>,
+    measure: Measure,
 }
 
 impl Mesh {
+    /// A mesh without solid cells.
     pub fn new(x: Axis, y: Axis) -> Self {
         let solid = vec![false; x.cells() * y.cells()];
-        Mesh { x, y, solid }
+        Mesh { x, y, solid, measure: Measure::PLANE }
     }
 
+    /// Number of cells.
     pub fn cells(&self) -> usize {
         self.x.cells() * self.y.cells()
     }
+    /// Number of nodes.
     pub fn nodes(&self) -> usize {
         self.x.nodes() * self.y.nodes()
     }
+    /// Index of the cell in column `i` and row `j`.
     pub fn cell(&self, i: usize, j: usize) -> usize {
         j * self.x.cells() + i
+    }
+    /// The axis along the direction `normal` (0 for x, 1 for y), and the other axis.
+    pub fn axes(&self, normal: usize) -> (&Axis, &Axis) {
+        if normal == 0 { (&self.x, &self.y) } else { (&self.y, &self.x) }
+    }
+    /// Index of the cell with the position `across` along the direction `normal` and `along` in the
+    /// other direction.
+    pub fn cell_across(&self, normal: usize, across: usize, along: usize) -> usize {
+        if normal == 0 { self.cell(across, along) } else { self.cell(along, across) }
     }
     /// Column and row of a cell.
     pub fn cell_ij(&self, cell: usize) -> (usize, usize) {
         (cell % self.x.cells(), cell / self.x.cells())
     }
+    /// Index of the node in column `i` and row `j`.
     pub fn node(&self, i: usize, j: usize) -> usize {
         j * self.x.nodes() + i
     }
+    /// Coordinates of a node.
     pub fn node_position(&self, node: usize) -> [f64; 2] {
         let (i, j) = (node % self.x.nodes(), node / self.x.nodes());
         [self.x.node_coordinate(i), self.y.node_coordinate(j)]
     }
-    /// The nine nodes of a cell, row by row from below; the fifth is the centre.
+    /// Indices of the nine nodes of a cell, row by row from below; the fifth is the centre.
     pub fn cell_nodes(&self, cell: usize) -> [usize; 9] {
         let (i, j) = self.cell_ij(cell);
         std::array::from_fn(|a| self.node(self.x.cell_node(i, a % 3), self.y.cell_node(j, a / 3)))
     }
+    /// Size of a cell along x and y.
     pub fn cell_size(&self, cell: usize) -> [f64; 2] {
         let (i, j) = self.cell_ij(cell);
         [self.x.size(i), self.y.size(j)]
     }
-    pub fn cell_area(&self, cell: usize) -> f64 {
-        let [hx, hy] = self.cell_size(cell);
-        hx * hy
+    /// Measure of a cell.
+    pub fn cell_measure(&self, cell: usize) -> CellMeasure {
+        self.measure.of_cell(self.cell_size(cell))
     }
+    /// Volume of a cell (its area in the plane, per unit depth).
+    pub fn cell_volume(&self, cell: usize) -> f64 {
+        self.cell_measure(cell).volume()
+    }
+    /// Area of a face of a cell whose normal has the direction `normal` (0 for x, 1 for y).
+    pub fn face_area(&self, cell: usize, normal: usize) -> f64 {
+        self.measure.of_face(self.cell_size(cell)[1 - normal])
+    }
+    /// Measure of integration.
+    pub fn measure(&self) -> Measure {
+        self.measure
+    }
+    /// The same mesh with another measure of integration.
+    pub fn with_measure(self, measure: Measure) -> Self {
+        Mesh { measure, ..self }
+    }
+    /// Coordinates of the centre of a cell.
     pub fn cell_centre(&self, cell: usize) -> [f64; 2] {
         let (i, j) = self.cell_ij(cell);
         [self.x.node_coordinate(2 * i + 1), self.y.node_coordinate(2 * j + 1)]
     }
+    /// Cell that contains a point; see [`Axis::locate`].
     pub fn locate(&self, p: [f64; 2]) -> usize {
         self.cell(self.x.locate(p[0]), self.y.locate(p[1]))
     }
-    /// Reference coordinates of a point in a cell, each -1 to 1 inside it.
+    /// Reference coordinates of a point relative to a cell, each -1 to 1 inside it.
     pub fn to_reference(&self, cell: usize, p: [f64; 2]) -> [f64; 2] {
         let [cx, cy] = self.cell_centre(cell);
         let [hx, hy] = self.cell_size(cell);
         [2.0 * (p[0] - cx) / hx, 2.0 * (p[1] - cy) / hy]
     }
-    /// The same for a point of a neighbouring cell, on the near side of periodic axes.
+    /// Reference coordinates, relative to a cell, of the nearest periodic image of a point.
     pub fn to_near_reference(&self, cell: usize, p: [f64; 2]) -> [f64; 2] {
         let centre = self.cell_centre(cell);
         let near = |axis: &Axis, at: f64, middle: f64| {
@@ -203,22 +254,25 @@ impl Mesh {
         };
         self.to_reference(cell, [near(&self.x, p[0], centre[0]), near(&self.y, p[1], centre[1])])
     }
+    /// Coordinates of the point with the given reference coordinates in a cell.
     pub fn from_reference(&self, cell: usize, r: [f64; 2]) -> [f64; 2] {
         let [cx, cy] = self.cell_centre(cell);
         let [hx, hy] = self.cell_size(cell);
         [cx + 0.5 * hx * r[0], cy + 0.5 * hy * r[1]]
     }
+    /// Maps a point into the domain along periodic axes.
     pub fn wrap(&self, p: [f64; 2]) -> [f64; 2] {
         [self.x.wrap(p[0]), self.y.wrap(p[1])]
     }
-    /// The up to nine cells that share a corner with a cell, itself included; across periodic seams.
+    /// The cells that share a corner with a cell, including itself and periodic neighbours; at most
+    /// nine.
     pub fn block(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
         let (i, j) = self.cell_ij(cell);
         let near = |axis: &Axis, k: usize| {
             let last = axis.cells() - 1;
             let below = if k > 0 { Some(k - 1) } else { axis.periodic.then_some(last) };
             let above = if k < last { Some(k + 1) } else { axis.periodic.then_some(0) };
-            // A periodic axis of one or two cells has no third.
+            // A periodic axis of one or two cells has no third cell.
             let below = below.filter(|&b| b != k);
             let above = above.filter(|&a| a != k && Some(a) != below);
             [below, Some(k), above]
@@ -228,7 +282,7 @@ impl Mesh {
             .flatten()
             .flat_map(move |j| x.into_iter().flatten().map(move |i| self.cell(i, j)))
     }
-    /// The up to four neighbours across faces, periodic ones included.
+    /// Neighbours of a cell across faces, including periodic neighbours; at most four.
     pub fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
         let (i, j) = self.cell_ij(cell);
         let step = |axis: &Axis, k: usize, up: bool| match (up, axis.periodic) {

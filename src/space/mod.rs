@@ -1,13 +1,16 @@
-//! Where things are: mesh, shape functions, elimination order, boundary conditions, particles.
+//! This module holds the discretisation in space: mesh, shape functions, constraints, particles and
+//! their resampling.
 
 pub mod constraints;
 pub mod fit;
 pub mod flow;
 pub mod incidence;
+pub mod measure;
 pub mod mesh;
 pub mod neighbours;
 pub mod particles;
 pub mod population;
 pub mod seeding;
+pub mod segment;
 pub mod shape;
 pub mod walls;

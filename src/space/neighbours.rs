@@ -1,13 +1,14 @@
-//! Faces without walls, and which cells touch across them.
+//! This module finds the faces between cells that carry no wall, and the cells on both sides.
 
 use super::mesh::Mesh;
 use super::walls::Enclosure;
 
-/// The up to four open neighbours of each cell.
+/// The neighbours of each cell across faces without walls, up to four per cell.
 #[derive(Clone, Debug)]
 pub struct Neighbours(Vec<Vec<u32>>);
 
 impl Neighbours {
+    /// Finds the neighbours of all cells.
     pub fn new(mesh: &Mesh, enclosure: &Enclosure) -> Self {
         let mut lists = vec![Vec::new(); mesh.cells()];
         for face in open_faces(mesh, enclosure) {
@@ -18,31 +19,34 @@ impl Neighbours {
         Neighbours(lists)
     }
 
+    /// Neighbours of a cell.
     pub fn of(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
         self.0[cell].iter().map(|&n| n as usize)
     }
 }
 
-/// A face without walls, from the left or lower cell to the other.
+/// A face without a wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Face {
+    /// The cell to the left or below, and the other cell.
     pub cells: [u32; 2],
-    /// 0: the face is vertical; 1: horizontal.
+    /// Direction of the normal: 0 for x (vertical face), 1 for y (horizontal face).
     pub normal: usize,
-    /// Coordinate of the face along its normal, as its two cells see it: they differ at the seam
-    /// of a periodic axis.
+    /// Coordinate of the face along its normal for each of its two cells; the two values differ
+    /// where a periodic axis is joined.
     pub at: [f64; 2],
-    /// Of its middle, along itself.
+    /// Coordinate of the midpoint along the face.
     pub middle: f64,
 }
 
-/// All faces without walls.
+/// All faces between cells that carry no wall.
 pub fn open_faces(mesh: &Mesh, enclosure: &Enclosure) -> Vec<Face> {
     let mut faces = Vec::new();
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let (i, j) = mesh.cell_ij(cell);
         for normal in 0..2 {
-            let (axis, k) = if normal == 0 { (&mesh.x, i) } else { (&mesh.y, j) };
+            let (axis, _) = mesh.axes(normal);
+            let [k, along] = if normal == 0 { [i, j] } else { [j, i] };
             let next = if k + 1 < axis.cells() {
                 k + 1
             } else if axis.periodic() {
@@ -50,7 +54,7 @@ pub fn open_faces(mesh: &Mesh, enclosure: &Enclosure) -> Vec<Face> {
             } else {
                 continue;
             };
-            let other = if normal == 0 { mesh.cell(next, j) } else { mesh.cell(i, next) };
+            let other = mesh.cell_across(normal, next, along);
             let at = [axis.lines()[k + 1], axis.lines()[next]];
             let middle = mesh.cell_centre(cell)[1 - normal];
             let walled = enclosure.obstacles.iter().any(|o| {

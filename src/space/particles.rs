@@ -1,46 +1,50 @@
-//! Particles: structure of arrays, kept sorted by cell. Columns that no effect needs are absent.
+//! This module stores the particles as a structure of arrays sorted by cell. Columns that no effect
+//! needs are absent.
 
 use super::mesh::Mesh;
 use crate::threads::{self, Divisible};
 
-/// A column that exists only when an effect calls for it.
+/// A column that exists only if an effect needs it.
 pub type Column<T> = Option<Vec<T>>;
 
-/// Material points.
+/// Particles (material points), with values in the plan's units.
 #[derive(Clone, Debug, Default)]
 pub struct Particles {
+    /// Positions.
     pub position: Vec<[f64; 2]>,
-    /// Area each particle stands for.
+    /// Area that each particle represents.
     pub volume: Vec<f64>,
-    /// Index into the plan's materials.
+    /// Index of the material of each particle.
     pub material: Vec<u8>,
-    /// Unit directors of layered materials.
+    /// Director (unit vector) of each particle; used for layered materials.
     pub director: Column<[f64; 2]>,
-    /// Viscosity carried from an initial field.
+    /// Viscosity carried by each particle from an initial field.
     pub viscosity: Column<f64>,
-    /// Density carried from an initial field.
+    /// Density carried by each particle from an initial field.
     pub density: Column<f64>,
-    /// Marked by a dye line at the start.
+    /// Whether each particle was marked at the start (`dye.marks`).
     pub mark: Column<bool>,
-    /// First particle of each cell, one more at the end; valid after [`Particles::sort`].
+    /// Index of the first particle of each cell, followed by the number of particles; valid after
+    /// [`Particles::sort`].
     pub cell_start: Vec<u32>,
     pub(crate) sorting: Sorting,
 }
 
-/// Particles that are worth a task of their own.
+/// Largest number of particles per task.
 pub const GRAIN: usize = 4096;
 
-/// The cell of a particle that is to be taken away.
+/// Cell number that marks a particle for removal.
 pub const GONE: u32 = u32::MAX;
 
-/// Room that sorting takes, kept from one time to the next.
+/// Buffers for sorting, kept between calls.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sorting {
     cells: Vec<u32>,
     next: Vec<u32>,
     order: Vec<u32>,
-    /// Particles that change their cell, in their order; then by the cell they come to.
+    /// Particles that leave their cell, in their order.
     leaving: Vec<u32>,
+    /// Those of them that are not removed, sorted by their new cell.
     arriving: Vec<u32>,
     pairs: Vec<[f64; 2]>,
     numbers: Vec<f64>,
@@ -49,7 +53,7 @@ pub(crate) struct Sorting {
 }
 
 impl Sorting {
-    /// Brings a column into the new order.
+    /// Permutes a column into the new order.
     fn permute<T: Sortable>(&mut self, column: &mut Vec<T>) {
         let Some(&any) = column.first() else { return };
         let mut room = std::mem::take(T::room(self));
@@ -61,9 +65,9 @@ impl Sorting {
     }
 }
 
-/// Places in the new order of the particles of some consecutive cells.
+/// Part of the new order that belongs to some consecutive cells.
 struct Places<'a> {
-    /// First place of each of these cells and of the next.
+    /// Index of the first particle of each of these cells and of the next cell.
     start: &'a [u32],
     order: &'a mut [u32],
 }
@@ -77,7 +81,7 @@ impl Divisible for Places<'_> {
     }
 }
 
-/// What a column can hold.
+/// Types that a column can have.
 trait Sortable: Copy + Send + Sync {
     fn room(sorting: &mut Sorting) -> &mut Vec<Self>;
 }
@@ -125,14 +129,22 @@ macro_rules! for_columns {
 }
 
 impl Particles {
+    /// Largest `| |n| - 1 |` of the directors; zero without directors.
+    pub fn director_error(&self) -> f64 {
+        let directors = self.director.iter().flatten();
+        directors.map(|n| (n[0].hypot(n[1]) - 1.0).abs()).fold(0.0, f64::max)
+    }
+
+    /// Number of particles.
     pub fn len(&self) -> usize {
         self.position.len()
     }
+    /// Whether there are no particles.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
     }
 
-    /// Particles of a cell; valid after [`Particles::sort`].
+    /// Indices of the particles of a cell; valid after [`Particles::sort`].
     pub fn of_cell(&self, cell: usize) -> std::ops::Range<usize> {
         self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize
     }
@@ -145,7 +157,7 @@ impl Particles {
         });
     }
 
-    /// Removes the particles for which `gone` is set, keeping the order of the others.
+    /// Removes the particles for which `gone` is true; the others keep their order.
     pub fn remove(&mut self, gone: &[bool]) {
         for_columns!(self, |c| {
             let mut i = 0;
@@ -165,17 +177,18 @@ impl Particles {
         self.sort_by_cells(mesh.cells());
     }
 
-    /// Sorts particles that were sorted and then moved into `cells`, and takes away those that are
-    /// [`GONE`]: the same order as [`Particles::sort`] finds, from those alone that changed.
+    /// Sorts particles that were sorted before and then moved into `cells`, and removes those whose
+    /// cell is [`GONE`]. The order is the same as that of [`Particles::sort`], but only the
+    /// particles that changed their cell are sorted.
     pub fn regroup(&mut self, cells: &[u32]) {
-        /// Cells that are worth a task of their own.
+        /// Largest number of cells per task.
         const CELL_GRAIN: usize = 512;
         let count = self.cell_start.len() - 1;
         let mut sorting = std::mem::take(&mut self.sorting);
         let mut start = std::mem::take(&mut sorting.cells);
         let Sorting { next, order, leaving, arriving, .. } = &mut sorting;
         leaving.clear();
-        // Few leave, but how many differs from step to step.
+        // Few particles leave, but their number differs from step to step.
         leaving.reserve(cells.len());
         arriving.reserve(cells.len());
         for cell in 0..count {
@@ -189,12 +202,13 @@ impl Particles {
             return;
         }
         let to = |p: u32| Some(cells[p as usize]).filter(|&c| c != GONE).map(|c| c as usize);
-        // First by cell those that arrive: `next[c]` is where those of a cell begin, then where
-        // they end.
+        // Sort the arriving particles by cell: `next[c]` is the index of the first one of a cell,
+        // and later the index after the last one.
         next.clear();
         next.resize(count + 1, 0);
         leaving.iter().filter_map(|&p| to(p)).for_each(|c| next[c + 1] += 1);
-        // Where each cell will begin: what it had, less what leaves, and what arrives.
+        // Index of the first particle of each cell: old number minus leaving plus arriving
+        // particles.
         let old = &self.cell_start;
         start.clear();
         start.push(0);
@@ -226,7 +240,7 @@ impl Particles {
             for cell in part {
                 let begin = if cell == 0 { 0 } else { next[cell - 1] };
                 let guests = &arriving[begin as usize..next[cell] as usize];
-                // In the order of all: those from cells before this one come first.
+                // Particles from cells before this one come first.
                 let before = guests.partition_point(|&p| p < old[cell]);
                 guests[..before].iter().for_each(|&p| put(p));
                 let own = old[cell]..old[cell + 1];
@@ -263,7 +277,7 @@ impl Particles {
         self.sorting = sorting;
     }
 
-    /// Total volume of a material.
+    /// Total volume of the particles of a material.
     pub fn volume_of(&self, material: usize) -> f64 {
         let [total] = threads::sum(0..self.len(), |p| {
             [if usize::from(self.material[p]) == material { self.volume[p] } else { 0.0 }]
@@ -291,7 +305,7 @@ mod tests {
         };
         particles.sort(&mesh);
         for step in 0..6 {
-            // None, few, and nearly all move; some go.
+            // No, few and nearly all particles change their cell; some are removed.
             let reach = [0.0, 0.02, 0.3, 5.0, 0.3, 0.1][step];
             let gone: Vec<bool> =
                 (0..particles.len()).map(|k| step > 2 && (k + step) % 29 == 0).collect();

@@ -1,13 +1,15 @@
-//! Population control: no cell runs empty or overfull.
+//! This module resamples the particles (population control), so that no cell has too few or too
+//! many.
 //!
-//! A cell that lacks particles, or has none in one of its quadrants, splits the particle nearest
-//! to the gap: the child takes half of its volume, and all of its kind there move a little so that
-//! their centroid stays. An overfull cell merges its closest pairs of one material. Volume and
-//! centroid are kept material by material (so a level at rest stays there, and no potential energy
-//! is made); directors are averaged as axes.
+//! In a cell with too few particles, or none in one of its quadrants, the particle nearest to the
+//! gap is split. The child takes half of its volume, and all particles of this material in the cell
+//! move slightly so that their centroid is unchanged. In a cell with too many particles, the
+//! closest pairs of one material are merged. The volume and the centroid of each material are
+//! conserved, so a level at rest stays at rest and no potential energy is created. Directors are
+//! averaged regardless of their sign.
 //!
-//! Of choices that are equal but for rounding, the one nearest to the middle of the domain is
-//! taken, so that mirror images decide alike. Otherwise a symmetric jet leans over: that of the
+//! Of choices that are equal up to rounding, the one nearest to the centre of the domain is taken,
+//! so that mirror images are treated alike. Otherwise a symmetric jet is deflected: that of the
 //! silo, at 6 cells per aperture graded by 8, by a quarter of the aperture at 0.7 ms.
 
 use super::fit::{Degree, Fit, Polynomial};
@@ -19,31 +21,34 @@ use super::walls::Enclosure;
 use crate::laws::director;
 use crate::threads;
 
-/// Particles of this share of the usual volume are split before smaller ones, which would make
-/// volumes ever more unequal: after 10,000 steps of a steady vortex, cells of 16 were off by 1.01 rows
-/// of particles with a quarter, and are by 0.91 with this (at random places they would be by 0.8).
+/// Fraction of the nominal volume above which particles are split first. Splitting smaller
+/// particles makes volumes more and more unequal: after 10,000 steps of a steady vortex, cells of
+/// 16 particles deviated by 1.01 rows of particles with a fraction of a quarter, and deviate by
+/// 0.91 with this one (with random positions they would deviate by 0.8).
 const SPLIT: f64 = 0.7;
 
-/// Cells that are worth a task of their own.
+/// Largest number of cells per task.
 const GRAIN: usize = 256;
 
-/// Shifted particles stay within this, in half cells.
+/// Largest reference coordinate of shifted particles.
 const INSIDE: f64 = 0.999;
 
-/// What was done, added up over a run.
+/// Numbers of events of particles, accumulated over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
+    /// Splits of a particle.
     pub splits: u64,
+    /// Merges of two particles.
     pub merges: u64,
-    /// Particles held back at walls that their step would have crossed.
+    /// Particles stopped at walls that their step would have crossed.
     pub held: u64,
     /// Particles that left through an open side.
     pub left: u64,
-    /// Empty cells refilled from a neighbour.
+    /// Empty cells that were refilled from a neighbour.
     pub healed: u64,
 }
 
-/// Bounds on the number of particles per cell.
+/// Resampling that keeps the number of particles per cell within bounds.
 #[derive(Clone, Debug)]
 pub struct Population {
     seeding: Seeding,
@@ -51,25 +56,28 @@ pub struct Population {
     room: Room,
 }
 
-/// Room that is kept from step to step.
+/// Buffers that are kept between steps.
 #[derive(Clone, Debug, Default)]
 struct Room {
-    /// Cells that lack particles.
+    /// Whether each cell has too few particles, or none in a quadrant.
     lacking: Vec<bool>,
-    /// Particles of a cell, and those of one kind.
+    /// Particles of a cell.
     members: Vec<usize>,
+    /// Particles of one material in a cell.
     kin: Vec<usize>,
-    /// Their reference coordinates.
+    /// Reference coordinates of these particles.
     places: Vec<[f64; 2]>,
 }
 
 impl Population {
+    /// Population control for a mesh; `seeding` gives the nominal number of particles per cell.
     pub fn new(mesh: &Mesh, enclosure: &Enclosure, seeding: Seeding) -> Self {
         let room = Room { lacking: vec![false; mesh.cells()], ..Room::default() };
         Population { seeding, neighbours: Neighbours::new(mesh, enclosure), room }
     }
 
-    /// Restores the bounds. `particles` must be sorted, and are sorted on return.
+    /// Restores the bounds and counts the events. `particles` must be sorted, and are sorted on
+    /// return.
     pub fn control(&mut self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
         self.merge(mesh, particles, count);
         self.split(mesh, particles, count);
@@ -90,7 +98,7 @@ impl Population {
         for cell in (0..mesh.cells()).filter(|&c| lacking[c]) {
             members.clear();
             members.extend(particles.of_cell(cell));
-            let nominal = mesh.cell_area(cell) / self.target() as f64;
+            let nominal = mesh.cell_volume(cell) / self.target() as f64;
             loop {
                 let place = |&p: &usize| mesh.to_reference(cell, particles.position[p]);
                 places.clear();
@@ -118,8 +126,8 @@ impl Population {
         while self.heal_all(mesh, particles, count) {}
     }
 
-    /// Refills empty cells that have a neighbour that is not; whether there were any. Cells amid
-    /// empty ones come next, from their refilled neighbours.
+    /// Refills empty cells that have a neighbour with particles; returns whether there were any.
+    /// Cells whose neighbours are all empty are refilled in later calls.
     fn heal_all(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) -> bool {
         let before = particles.len();
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
@@ -134,7 +142,7 @@ impl Population {
         any
     }
 
-    /// Whether a cell that holds particles has too few, or none in a quadrant.
+    /// Whether a cell that is not empty has too few particles, or none in a quadrant.
     fn lacks(&self, mesh: &Mesh, particles: &Particles, cell: usize, least: usize) -> bool {
         let members = particles.of_cell(cell);
         if members.len() < least {
@@ -151,8 +159,8 @@ impl Population {
         self.target() >= 4 && held.contains(&false)
     }
 
-    /// A place (reference coordinates) that lacks a particle: in an empty quadrant, or, where
-    /// the cell has too few, the lattice point farthest from all.
+    /// Position (reference coordinates) for a new particle: the centre of an empty quadrant, or, if
+    /// the cell has too few particles, the lattice point farthest from all of them.
     fn gap(&self, mesh: &Mesh, cell: usize, places: &[[f64; 2]], least: usize) -> Option<[f64; 2]> {
         if self.target() >= 4 {
             let empty = (0..4).map(quadrant).filter(|c| !places.iter().any(|r| holds(c, r)));
@@ -177,7 +185,8 @@ impl Population {
         )
     }
 
-    /// Refills an empty cell with half of the largest particle of its neighbours.
+    /// Refills an empty cell with half of the largest particle of its neighbours; returns whether
+    /// there was one.
     fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> bool {
         let donor = cheapest(
             self.neighbours
@@ -217,18 +226,19 @@ impl Population {
     }
 }
 
-/// Centre of a quadrant in reference coordinates.
+/// Centre of the quadrant `q` in reference coordinates.
 fn quadrant(q: usize) -> [f64; 2] {
     [(q % 2) as f64 - 0.5, (q / 2) as f64 - 0.5]
 }
 
-/// Whether the quadrant around `centre` holds a place; one on the line between two is in both.
+/// Whether the quadrant around `centre` contains a point; a point on the line between two quadrants
+/// is in both.
 fn holds(centre: &[f64; 2], r: &[f64; 2]) -> bool {
     (0..2).all(|k| centre[k] * r[k] > -SAME)
 }
 
-/// The member nearest to a place among those of at least `least_volume`; failing that, the
-/// largest.
+/// The member nearest to `place` among those with at least `least_volume`; if there are none, the
+/// largest member.
 fn nearest(
     mesh: &Mesh,
     particles: &Particles,
@@ -248,8 +258,9 @@ fn nearest(
         .unwrap_or(members[0])
 }
 
-/// Shifts a parent, its child, whose volume came from the parent's place, and all others of their
-/// kind in the cell such that their centroid is what it was; none leaves the cell.
+/// Shifts all particles of the material of `parent` and `child` in the cell so that their centroid
+/// is the same as before the split, when the volume of the child was at the position of the parent.
+/// No particle leaves the cell.
 fn keep_centroid(
     mesh: &Mesh,
     particles: &mut Particles,
@@ -268,18 +279,18 @@ fn keep_centroid(
     }
 }
 
-/// Fields that particles of one kind carry in a cell, as polynomials: particles that are moved
-/// without flow take the field's difference between their places with them. Without it, a
-/// child has its parent's density at a place where the density is another, a first-order error.
+/// Polynomials of the fields that particles of one material carry in a cell. A particle that is
+/// moved without flow gets the difference of the field between its two positions added. Otherwise a
+/// child would keep its parent's density at a position with another density, a first-order error.
 struct CarriedFields<'a> {
     density: Option<Polynomial>,
     log_viscosity: Option<Polynomial>,
-    /// Where they were, in reference coordinates.
+    /// Positions before the move, in reference coordinates.
     places: &'a [[f64; 2]],
 }
 
 impl<'a> CarriedFields<'a> {
-    /// `places`: room.
+    /// Fits the fields of the particles `kin`; `places` is a buffer for their positions.
     fn new(
         mesh: &Mesh,
         particles: &Particles,
@@ -317,17 +328,19 @@ impl<'a> CarriedFields<'a> {
     }
 }
 
-/// Differences below this are rounding: of reference coordinates, and of costs relative to them.
+/// Differences below this are rounding errors; it applies to reference coordinates and to relative
+/// differences of costs.
 const SAME: f64 = 1e-9;
 
-/// Squared distance from the middle of the domain: the same for mirror images.
+/// Squared distance from the centre of the domain; it is equal for mirror images.
 fn from_middle(mesh: &Mesh, p: [f64; 2]) -> f64 {
     let x = p[0] - 0.5 * (mesh.x.start() + mesh.x.end());
     let y = p[1] - 0.5 * (mesh.y.start() + mesh.y.end());
     x * x + y * y
 }
 
-/// The choice of least cost among `(cost, from_middle, choice)`; of equal ones the innermost.
+/// The choice of least cost among `(cost, from_middle, choice)`; of equal costs, the choice nearest
+/// to the centre of the domain.
 fn cheapest<T>(choices: impl Iterator<Item = (f64, f64, T)>) -> Option<T> {
     let better = |a: &(f64, f64, T), b: &(f64, f64, T)| {
         let slack = SAME * b.0.abs();
@@ -336,7 +349,8 @@ fn cheapest<T>(choices: impl Iterator<Item = (f64, f64, T)>) -> Option<T> {
     choices.reduce(|best, next| if better(&next, &best) { next } else { best }).map(|c| c.2)
 }
 
-/// The two members of one kind that cost least to merge: close and small.
+/// The pair of members of one material that costs least to merge: the cost is small for close and
+/// small particles.
 fn closest_pair(
     mesh: &Mesh,
     particles: &Particles,
@@ -361,7 +375,7 @@ fn closest_pair(
 }
 
 impl Particles {
-    /// Appends a particle of a material that carries nothing of its own.
+    /// Appends a particle of a material without carried values.
     pub fn push(&mut self, position: [f64; 2], volume: f64, material: u8) {
         self.position.push(position);
         self.volume.push(volume);
@@ -380,8 +394,9 @@ impl Particles {
         }
     }
 
-    /// Joins particle `b` to `a` (which keeps its place in the list): volumes add up, position
-    /// and carried values are means weighted by volume, directors are averaged as axes.
+    /// Merges particle `b` into particle `a`, which keeps its index; `b` is not removed. Volumes
+    /// add up, position and carried values are means weighted by volume, and directors are averaged
+    /// regardless of their sign.
     pub fn absorb(&mut self, a: usize, b: usize) {
         let (va, vb) = (self.volume[a], self.volume[b]);
         let (fa, fb) = (va / (va + vb), vb / (va + vb));

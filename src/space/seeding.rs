@@ -1,31 +1,34 @@
-//! Placing particles at the start.
+//! This module places the particles at the start.
 
 use super::mesh::Mesh;
 use crate::scene::Placement;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// How many particles a cell gets, and where.
+/// Number and positions of the particles of a cell at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seeding {
-    /// Particles per direction.
+    /// Number of particles per direction.
     pub side: usize,
+    /// Placement of the particles.
     pub placement: Placement,
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
 impl Seeding {
-    /// Particles per cell.
+    /// Number of particles per cell.
     pub fn count(&self) -> usize {
         self.side * self.side
     }
 
-    /// Random numbers of one cell: independent of the order in which cells are filled.
+    /// Random number generator of one cell; it does not depend on the order in which cells are
+    /// filled.
     pub fn random(&self, cell: usize) -> Pcg64 {
         Pcg64::seed_from_u64(self.seed ^ (cell as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
 
-    /// Positions in a cell.
+    /// Positions of the particles in a cell.
     pub fn positions(&self, mesh: &Mesh, cell: usize, random: &mut Pcg64) -> Vec<[f64; 2]> {
         let n = self.side as f64;
         (0..self.count())

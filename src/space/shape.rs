@@ -1,17 +1,18 @@
-//! Biquadratic (Q2) shape functions on the reference cell `[-1, 1]^2` and its Gauss points.
+//! This module defines the biquadratic (Q2) shape functions on the reference cell `[-1, 1]^2` and
+//! its Gauss points.
 //!
-//! Node `a` sits at column `a % 3`, row `a / 3`; node 4 is the centre. The pressure basis of a
+//! Node `a` is in column `a % 3` and row `a / 3`; node 4 is the centre. The pressure basis of a
 //! cell is `1, xi, eta` (discontinuous linear, P1disc), orthogonal on a rectangle:
 //! `integral q_i q_j = area diag(1, 1/3, 1/3)`.
 
 use std::sync::LazyLock;
 
-/// Nodes of the element.
+/// Number of nodes of the element.
 pub const NODES: usize = 9;
-/// The node at the centre, which no other cell shares.
+/// Local nodes on the left, right, lower and upper side of a cell, ascending along the side.
+pub const SIDE_NODES: [[usize; 3]; 4] = [[0, 3, 6], [2, 5, 8], [0, 1, 2], [6, 7, 8]];
+/// Index of the node at the centre, which no other cell shares.
 pub const CENTRE: usize = 4;
-/// `integral q_i^2 / area` of the pressure basis.
-pub const PRESSURE_MASS: [f64; 3] = [1.0, 1.0 / 3.0, 1.0 / 3.0];
 
 /// Quadratic Lagrange functions at -1, 0, 1 and their derivatives.
 const fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {
@@ -21,12 +22,16 @@ const fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {
 /// Values and reference derivatives of the nine shape functions at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
+    /// Values.
     pub n: [f64; NODES],
+    /// Derivatives along xi.
     pub d_xi: [f64; NODES],
+    /// Derivatives along eta.
     pub d_eta: [f64; NODES],
 }
 
 impl Shape {
+    /// Shape functions at a point (reference coordinates).
     pub fn at(r: [f64; 2]) -> Self {
         let (fx, dx) = quadratic(r[0]);
         let (fy, dy) = quadratic(r[1]);
@@ -42,12 +47,12 @@ impl Shape {
         s
     }
 
-    /// Values of the three functions of one direction.
+    /// Values of the three quadratic functions of one direction at the reference coordinate `t`.
     pub fn line(t: f64) -> [f64; 3] {
         quadratic(t).0
     }
 
-    /// Only the values; what interpolation needs.
+    /// Values of the nine shape functions at a point, for interpolation.
     pub fn values(r: [f64; 2]) -> [f64; NODES] {
         let (fx, _) = quadratic(r[0]);
         let (fy, _) = quadratic(r[1]);
@@ -55,11 +60,14 @@ impl Shape {
     }
 }
 
-/// A Gauss point of the reference cell; weights add up to 1 (multiply by the cell's area).
+/// A Gauss point of the reference cell.
 #[derive(Clone, Copy, Debug)]
 pub struct GaussPoint {
+    /// Reference coordinates.
     pub r: [f64; 2],
+    /// Weight; the weights of a rule add up to 1 and are multiplied by the area of the cell.
     pub weight: f64,
+    /// Shape functions at the point.
     pub shape: Shape,
 }
 
@@ -68,7 +76,7 @@ pub const GAUSS_3: [f64; 3] = [-0.774_596_669_241_483_4, 0.0, 0.774_596_669_241_
 /// Weights of the three-point rule.
 pub const GAUSS_3_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
 
-/// The 3 x 3 rule, exact to degree five in each direction, row by row from below.
+/// Points of the 3 x 3 Gauss rule, exact to degree five in each direction, row by row from below.
 pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
     std::array::from_fn(|g| {
         let r = [GAUSS_3[g % 3], GAUSS_3[g / 3]];
@@ -77,7 +85,7 @@ pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
     })
 });
 
-/// Points of [`GAUSS_6X6`].
+/// Number of points of [`GAUSS_6X6`].
 pub const SUBPOINTS: usize = 36;
 
 /// Abscissae and weights (adding up to one half) of the positive half of the six-point rule.
@@ -87,7 +95,7 @@ const GAUSS_6: [(f64, f64); 3] = [
     (0.932_469_514_203_152, 0.085_662_246_189_585_2),
 ];
 
-/// A 6 x 6 rule that resolves what cuts through a cell.
+/// Points of the 6 x 6 Gauss rule, used for cells that contain an interface.
 pub static GAUSS_6X6: LazyLock<[GaussPoint; SUBPOINTS]> = LazyLock::new(|| {
     let point = |k: usize| {
         let (x, w) = GAUSS_6[if k < 3 { 2 - k } else { k - 3 }];
@@ -99,10 +107,11 @@ pub static GAUSS_6X6: LazyLock<[GaussPoint; SUBPOINTS]> = LazyLock::new(|| {
     })
 });
 
-/// Something of the nine shape functions at the nine points of [`GAUSS_3X3`], `[point][node]`.
+/// Values or derivatives of the nine shape functions at the nine points of [`GAUSS_3X3`],
+/// `[point][node]`.
 pub type Table = [[f64; NODES]; 9];
 
-/// `x` and `y`: the factors in either direction, by `[Gauss abscissa][node]`.
+/// Table of products of the factors `x` and `y` of the two directions, `[Gauss abscissa][node]`.
 const fn product(x: &[[f64; 3]; 3], y: &[[f64; 3]; 3]) -> Table {
     let mut t = [[0.0; NODES]; 9];
     let mut k = 0;
@@ -118,14 +127,16 @@ const AT_GAUSS: [([f64; 3], [f64; 3]); 3] =
     [quadratic(GAUSS_3[0]), quadratic(GAUSS_3[1]), quadratic(GAUSS_3[2])];
 /// The quadratic functions of one direction at the three points of [`GAUSS_3`], `[point][node]`.
 pub const VALUES_AT_GAUSS: [[f64; 3]; 3] = [AT_GAUSS[0].0, AT_GAUSS[1].0, AT_GAUSS[2].0];
-/// Their derivatives.
+/// Derivatives of the quadratic functions of one direction at the points of [`GAUSS_3`],
+/// `[point][node]`.
 pub const SLOPES_AT_GAUSS: [[f64; 3]; 3] = [AT_GAUSS[0].1, AT_GAUSS[1].1, AT_GAUSS[2].1];
-/// Reference derivatives at the Gauss points.
+/// Derivatives along xi at the Gauss points.
 pub static D_XI_AT_GAUSS: Table = product(&SLOPES_AT_GAUSS, &VALUES_AT_GAUSS);
+/// Derivatives along eta at the Gauss points.
 pub static D_ETA_AT_GAUSS: Table = product(&VALUES_AT_GAUSS, &SLOPES_AT_GAUSS);
 
-/// Five-point Gauss rule `(abscissa, weight)` on `[-1, 1]`, weights adding up to 1: for loads and
-/// error norms, where 3 x 3 would be the error.
+/// Five-point Gauss rule `(abscissa, weight)` on `[-1, 1]` with weights that add up to 1, for loads
+/// and error norms, for which the error of the 3 x 3 rule would dominate.
 pub const GAUSS_5: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.118_463_442_528_094_55),
     (-0.538_469_310_105_683, 0.239_314_335_249_683_23),

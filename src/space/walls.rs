@@ -1,34 +1,25 @@
-//! Walls as obstacles: what keeps particles and tracers on their side.
+//! This module stops particles and dye lines at walls, and lets them leave through open sides.
 
 use super::mesh::{Mesh, ON_LINE};
+use super::segment::Segment;
 
-/// A straight obstacle along a mesh line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Obstacle {
-    /// 0: at a constant x; 1: at a constant y.
-    pub normal: usize,
-    pub at: f64,
-    /// Extent along the other direction.
-    pub from: f64,
-    pub to: f64,
-}
-
-/// Where a path ended.
+/// End of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Landing {
-    /// Where it wanted to go.
+    /// The path ends at its target.
     Free([f64; 2]),
-    /// Held back by a wall.
+    /// A wall stopped the path at this point.
     Held([f64; 2]),
-    /// Through an open side.
+    /// The path left through an open side.
     Left,
 }
 
-/// All obstacles of a scene and which sides let particles out.
+/// All obstacles of a scene, and the sides through which particles leave.
 #[derive(Clone, Debug, Default)]
 pub struct Enclosure {
-    pub obstacles: Vec<Obstacle>,
-    /// left, right, bottom, top
+    /// Walls and sides of blocks, in the plan's units.
+    pub obstacles: Vec<Segment>,
+    /// Whether each side of the domain is open: left, right, bottom, top.
     pub open: [bool; 4],
 }
 
@@ -51,7 +42,7 @@ impl Enclosure {
                 held = true;
             }
         }
-        // Each pass removes one crossing; a path meets few walls.
+        // Each pass removes one crossing; a path crosses few walls.
         for _ in 0..8 {
             let first = self
                 .obstacles
@@ -67,22 +58,23 @@ impl Enclosure {
     }
 }
 
-impl Obstacle {
-    /// The largest coordinate below it that no cell above it counts as its own.
+impl Segment {
+    /// The largest coordinate below the wall that does not belong to a cell above it.
     fn below(&self, mesh: &Mesh) -> f64 {
-        let axis = if self.normal == 0 { &mesh.x } else { &mesh.y };
+        let (axis, _) = mesh.axes(self.normal);
         let line = axis.nearest_line(self.at);
         self.at - 2.0 * ON_LINE * axis.size(line.saturating_sub(1))
     }
 
-    /// Fraction of the path at which it passes through. A point on the line counts to the upper
-    /// side, as cells do; from below the wall is where that begins.
+    /// Fraction of the path at which it crosses the wall. A point on the line belongs to the upper
+    /// side, as in [`Mesh::locate`]. For a path from below, the wall is at the lower limit of the
+    /// upper side.
     fn crossing(&self, mesh: &Mesh, p0: [f64; 2], p1: [f64; 2]) -> Option<f64> {
         let (a, b) = (p0[self.normal], p1[self.normal]);
         let above = a >= self.at;
-        let axis = if self.normal == 0 { &mesh.x } else { &mesh.y };
+        let (axis, _) = mesh.axes(self.normal);
         if !above && b < self.at - 2.0 * ON_LINE * axis.length() {
-            // Most paths are far from most walls: no need to know where exactly this one begins.
+            // Most paths are far from most walls: the exact limit is not needed.
             return None;
         }
         let plane = if above { self.at } else { self.below(mesh) };
@@ -105,17 +97,17 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_holds_a_path_on_its_side_and_an_aperture_lets_it_through() {
+    fn a_wall_stops_a_path_and_an_aperture_lets_it_through() {
         let e = Enclosure {
-            obstacles: vec![Obstacle { normal: 1, at: 1.0, from: 0.0, to: 1.0 }],
+            obstacles: vec![Segment { normal: 1, at: 1.0, from: 0.0, to: 1.0 }],
             open: [false; 4],
         };
         let m = mesh();
         assert_eq!(e.follow(&m, [0.5, 1.5], [0.6, 0.7]), Landing::Held([0.6, 1.0]));
         let below = (1.0 - 2.0 * ON_LINE).next_down();
         assert_eq!(e.follow(&m, [0.5, 0.5], [0.6, 1.7]), Landing::Held([0.6, below]));
-        assert_eq!(m.locate([0.6, below]), 0, "a point that a wall holds is on its side");
-        // A point that only comes near counts to the cell above the wall, and is held too.
+        assert_eq!(m.locate([0.6, below]), 0, "a point stopped by a wall is on its side");
+        // A point just below the wall belongs to the cell above it, and is stopped too.
         assert_eq!(
             e.follow(&m, [0.5, 0.5], [0.5, 1.0 - 0.1 * ON_LINE]),
             Landing::Held([0.5, below])
@@ -126,11 +118,11 @@ mod tests {
     }
 
     #[test]
-    fn corners_hold_both_directions_and_open_sides_let_out() {
+    fn corners_stop_both_directions_and_open_sides_let_particles_leave() {
         let e = Enclosure {
             obstacles: vec![
-                Obstacle { normal: 0, at: 1.0, from: 0.0, to: 1.0 },
-                Obstacle { normal: 1, at: 1.0, from: 0.0, to: 1.0 },
+                Segment { normal: 0, at: 1.0, from: 0.0, to: 1.0 },
+                Segment { normal: 1, at: 1.0, from: 0.0, to: 1.0 },
             ],
             open: [false, true, false, false],
         };

@@ -1,8 +1,8 @@
-//! Hard cases: does it stay stable?
+//! The stress battery: tests the stability of the method on extreme scenes.
 //!
-//! A [`Trial`] is a hostile scene, a number of steps and, where one is known, the limit its result
-//! must agree with. Every trial is held to the same fixed [`CRITERIA`] at every step; its verdict
-//! is how far it stays inside them.
+//! A [`Trial`] is an extreme scene with a number of steps and, where one is known, a limit with
+//! which its result must agree. Every trial must satisfy the same fixed [`CRITERIA`] at every step;
+//! its verdict says by how much it does.
 
 mod page;
 mod run;
@@ -18,37 +18,40 @@ use crate::sim::Run;
 use crate::verify::{Bound, Check};
 use serde::Serialize;
 
-/// What every run must keep at every step.
+/// Upper bounds that every run must satisfy at every step.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Criteria {
-    /// Relative difference of the power of loads and dissipation.
+    /// Relative difference between the power of the loads and the dissipation.
     pub power: f64,
-    /// Relative divergence.
+    /// Divergence of the velocity relative to the strain rate, L2 norm.
     pub divergence: f64,
-    /// Corrections of a step, all its solutions together.
+    /// Number of solver corrections in a step, summed over its solutions.
     pub corrections: f64,
-    /// Share of the volume that lies in the wrong cell (sum of |volume of particles - area|), over
-    /// that of a row of particles in a cell; incompressible scenes.
+    /// Sum over cells of |volume of particles - area|, over the total area, relative to the share
+    /// of one row of particles in a cell; incompressible scenes.
     pub misplaced: f64,
     /// Relative change of a material's projected area.
     pub drift: f64,
-    /// Relative change of the volume of all particles of a closed, incompressible scene.
+    /// Relative change of the volume of all particles; incompressible scenes that no particle
+    /// leaves.
     pub volume: f64,
-    /// `| |n| - 1 |`
+    /// Largest deviation of a director's length from 1, `| |n| - 1 |`.
     pub director: f64,
-    /// Particles out of the domain or inside a solid.
+    /// Number of particles outside the domain or inside a solid.
     pub outside: f64,
-    /// Largest speed over that of the first instant, or over a tenth of the scene's own unit of
-    /// speed where that is larger.
+    /// Largest speed over the largest initial speed, or over a tenth of the scene's unit of speed
+    /// if that is larger.
     pub growth: f64,
-    /// Farthest that a carried viscosity or density goes beyond its first extrema, relative to the
-    /// larger; incompressible scenes.
+    /// Largest excess of a carried viscosity or density beyond its initial range, relative to the
+    /// larger bound of that range; incompressible scenes.
     pub extrema: f64,
-    /// A trial passes this factor inside its bounds; nearer than that its margin is told.
+    /// Smallest factor between a value and its bound at which a trial passes; below it the margin
+    /// is reported.
     pub margin: f64,
 }
 
-/// The bounds. Drift is that of a coarse mesh, where a row of particles is a large part of a rim.
+/// The bounds of all trials. The bound of the drift holds for a coarse mesh, on which a row of
+/// particles is a large part of an interface.
 pub const CRITERIA: Criteria = Criteria {
     power: 1e-6,
     divergence: 1e-9,
@@ -63,48 +66,59 @@ pub const CRITERIA: Criteria = Criteria {
     margin: 2.0,
 };
 
-/// Compares what a run came to with what is known.
+/// Checks of a finished run against a known result.
 pub type Expectation = Box<dyn Fn(&dyn Run) -> Result<Vec<Check>, CaseError> + Send + Sync>;
 
-/// A hostile scene.
+/// An extreme scene and its expected result.
 pub struct Trial {
+    /// Name of the group.
     pub group: &'static str,
+    /// Name, unique within its group.
     pub name: String,
+    /// Scene to run.
     pub scene: SceneSource,
-    /// The scene's end may come first.
+    /// Largest number of steps; the scene may end earlier.
     pub steps: u64,
-    /// Drift does not say anything here: a material of less than a cell, or one that leaves.
+    /// True if the drift is not checked, because a material is smaller than a cell, changes its
+    /// volume or leaves the domain.
     pub drifts: bool,
+    /// Checks against a known result, if there is one.
     pub expect: Option<Expectation>,
-    /// Part of the quick battery.
+    /// True if the trial is part of the quick battery.
     pub quick: bool,
 }
 
-/// How a trial went.
+/// Outcome of a trial.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
+    /// Name of the group.
     pub group: &'static str,
+    /// Name of the trial.
     pub name: String,
+    /// Verdict over all checks.
     pub verdict: Verdict,
-    /// Steps that were taken.
+    /// Number of steps taken.
     pub steps: u64,
-    /// The check nearest to its bound, or the first that failed.
+    /// The check closest to its bound, or the first failed one.
     pub tightest: Option<Check>,
+    /// All checks; empty if the run failed.
     pub checks: Vec<Check>,
 }
 
-/// The result of a trial.
+/// Verdict of a trial.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Everything at least a factor of [`Criteria::margin`] inside its bounds.
+    /// All values are inside their bounds by at least a factor of [`Criteria::margin`].
     Pass,
-    /// Inside, by this factor.
+    /// All values are inside their bounds, the closest one by this factor.
     Margin(f64),
+    /// The trial failed, for this reason.
     Fail(String),
 }
 
 impl Verdict {
+    /// True if the trial failed.
     pub fn is_failure(&self) -> bool {
         matches!(self, Verdict::Fail(_))
     }
@@ -120,7 +134,7 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// Verdict over some checks, and the one that it hangs on.
+/// Verdict over some checks, and the check that determines it.
 pub fn judge(checks: &[Check]) -> (Verdict, Option<Check>) {
     if let Some(c) = checks.iter().find(|c| !c.passed) {
         let reason = format!("{} is {:.2e}, must be {}", c.what, c.value, c.bound);
@@ -134,8 +148,8 @@ pub fn judge(checks: &[Check]) -> (Verdict, Option<Check>) {
     }
 }
 
-/// How many times a value could grow before it meets its bound. Lower bounds (rates of
-/// convergence) and values of zero have no such factor.
+/// Factor by which a value could grow before it reaches its bound. `None` for lower bounds (rates
+/// of convergence) and values of zero.
 fn margin(c: &Check) -> Option<f64> {
     let (most, value) = match c.bound {
         Bound::AtMost(most) => (most, c.value),
@@ -151,7 +165,7 @@ mod tests {
     use std::collections::HashSet;
 
     #[test]
-    fn verdicts_hang_on_the_nearest_bound() {
+    fn the_tightest_check_determines_the_verdict() {
         let check = |value, most| Check::new("it", value, Bound::AtMost(most));
         let (verdict, tightest) = judge(&[check(0.0, 0.0), check(1e-3, 1.0), check(1.0, 1.5)]);
         assert_eq!(verdict, Verdict::Margin(1.5));
@@ -166,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn trials_have_names_of_their_own() {
+    fn trial_names_are_unique() {
         let all = all().expect("valid scenes");
         let names: HashSet<_> = all.iter().map(|t| (t.group, t.name.as_str())).collect();
         assert_eq!(names.len(), all.len());

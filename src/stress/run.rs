@@ -1,4 +1,4 @@
-//! Runs trials, and keeps what failed.
+//! Runs trials and stores the scenes of failed ones.
 
 use super::{CRITERIA, Outcome, Trial, Verdict, judge};
 use crate::cases::{CaseError, plan_of};
@@ -11,18 +11,20 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Speeds below this share of a scene's own unit are rest.
+/// Smallest reference speed for the growth of speed, in units of the scene.
 const LEAST_SPEED: f64 = 0.1;
 
-/// The first instant, which later ones are compared with.
+/// Initial values, with which later ones are compared.
 struct First {
+    /// Volume of all particles.
     volume: f64,
+    /// Reference speed, m/s.
     speed: f64,
     /// Smallest and largest carried viscosity and density.
     extrema: [Option<[f64; 2]>; 2],
 }
 
-/// Smallest and largest value of a column.
+/// Smallest and largest value of a list.
 fn range(column: &Option<Vec<f64>>) -> Option<[f64; 2]> {
     let fold = |r: [f64; 2], v: &f64| [r[0].min(*v), r[1].max(*v)];
     column.as_ref().map(|c| c.iter().fold([f64::INFINITY, f64::NEG_INFINITY], fold))
@@ -39,7 +41,7 @@ impl First {
     }
 }
 
-/// The largest value that each criterion has had.
+/// Largest value of each criterion so far, as in [`Criteria`](super::Criteria).
 #[derive(Default)]
 struct Worst {
     power: f64,
@@ -54,7 +56,7 @@ struct Worst {
     extrema: f64,
 }
 
-/// The larger one; not-a-number, once met, stays.
+/// Sets `worst` to the larger of both; NaN is kept.
 fn raise(worst: &mut f64, value: f64) {
     if !worst.is_nan() && (value > *worst || value.is_nan()) {
         *worst = value;
@@ -62,6 +64,7 @@ fn raise(worst: &mut f64, value: f64) {
 }
 
 impl Worst {
+    /// Updates all values from the current state of a run.
     fn observe(&mut self, run: &dyn Run, first: &First) {
         let (row, plan, particles) = (run.row(), run.plan(), run.particles());
         raise(&mut self.power, row.power_error);
@@ -90,6 +93,7 @@ impl Worst {
         }
     }
 
+    /// Checks of all values; without that of the drift if `drifts`.
     fn checks(&self, drifts: bool) -> Vec<Check> {
         let c = &CRITERIA;
         let mut out = vec![
@@ -110,19 +114,20 @@ impl Worst {
     }
 }
 
-/// Share of the volume that lies in the wrong cell, over that of a row of particles in a cell.
+/// Sum over cells of |volume of particles - area|, over the total area, relative to the share of
+/// one row of particles in a cell.
 fn misplaced_volume(run: &dyn Run) -> f64 {
     let (mesh, particles) = (&run.plan().mesh, run.particles());
     let (mut wrong, mut all) = (0.0, 0.0);
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let volume: f64 = particles.of_cell(cell).map(|p| particles.volume[p]).sum();
-        wrong += (volume - mesh.cell_area(cell)).abs();
-        all += mesh.cell_area(cell);
+        wrong += (volume - mesh.cell_volume(cell)).abs();
+        all += mesh.cell_volume(cell);
     }
     wrong / all * run.plan().method.seeding.side as f64
 }
 
-/// Particles out of the domain, inside a solid, or nowhere.
+/// Number of particles outside the domain, inside a solid, or with a position that is not finite.
 fn misplaced(run: &dyn Run) -> usize {
     let mesh = &run.plan().mesh;
     let inside = |v: f64, axis: &Axis| v >= axis.start() && v <= axis.end();
@@ -134,10 +139,10 @@ fn misplaced(run: &dyn Run) -> usize {
 }
 
 impl Trial {
-    /// Runs it; what cannot be run has failed, with the reason.
+    /// Runs the trial. A scene that cannot be run is a failure with a reason.
     pub fn run(&self) -> Outcome {
         let mut steps = 0;
-        // A fault of one trial must not hide the others.
+        // A panic in one trial must not stop the others.
         let attempt = catch_unwind(AssertUnwindSafe(|| self.attempt(&mut steps)));
         let failed = |reason: String| (Verdict::Fail(reason), None);
         let (checks, (verdict, tightest)) = match attempt {
@@ -152,6 +157,7 @@ impl Trial {
         Outcome { group, name, verdict, steps, tightest, checks }
     }
 
+    /// Runs the trial and returns its checks; `steps` counts the steps taken.
     fn attempt(&self, steps: &mut u64) -> Result<Vec<Check>, CaseError> {
         let plan = plan_of(&self.scene)?;
         let mut run = sim::start(Arc::new(plan))?;
@@ -171,7 +177,8 @@ impl Trial {
     }
 }
 
-/// Runs trials on all processors; outcomes come in the order of the trials.
+/// Runs trials on all processors. Outcomes are in the order of the trials; `announce` is called
+/// with the number of finished trials and each outcome.
 pub fn run_all(trials: &[Trial], announce: impl Fn(usize, &Outcome) + Sync) -> Vec<Outcome> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());
@@ -196,7 +203,8 @@ pub fn run_all(trials: &[Trial], announce: impl Fn(usize, &Outcome) + Sync) -> V
     done.into_iter().map(|d| d.1).collect()
 }
 
-/// Writes a trial's scene and the reason it failed to a folder of its own below another.
+/// Writes the scene of a failed trial and the reason to a new folder below `folder`, and returns
+/// that folder.
 pub fn keep(folder: &Path, trial: &Trial, outcome: &Outcome) -> std::io::Result<PathBuf> {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' };
     let words = format!("{} {}", trial.group, trial.name).to_lowercase();
@@ -227,7 +235,7 @@ mod tests {
                         shear_viscosity = 1\ndensity = 1\n[[regions]]\nmaterial = \"a\"\n";
 
     #[test]
-    fn a_bad_trial_fails_with_a_reason_and_leaves_what_reproduces_it() {
+    fn a_failed_trial_has_a_reason_and_keeps_its_scene() {
         let never = |_: &dyn Run| Ok(vec![Check::new("speed", 1.0, Bound::AtMost(0.5))]);
         let bad = trial("bad", "too fast: 1/2", DROP.into(), 1).expecting(never);
         let outcome = bad.run();
@@ -241,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_converge_fails_with_the_place() {
+    fn a_solve_that_does_not_converge_fails_with_a_reason() {
         let text = DROP.replace("cells = 4", "cells = 4\nmax_corrections = 1\ntolerance = 1e-14")
             + "shape.where = \"x < 0.3\"\n[materials.b]\nshear_viscosity = 1e-7\nbackground = true\n";
         let outcome = trial("bad", "one correction", text, 1).run();

@@ -1,4 +1,4 @@
-//! The battery.
+//! Defines the trials of the stress battery.
 
 use super::{Expectation, Trial};
 use crate::cases::{
@@ -30,8 +30,8 @@ pub fn all() -> Result<Vec<Trial>, CaseError> {
         .collect())
 }
 
-/// Parts of names of trials that the quick battery leaves out, for something harder of their kind
-/// is in it.
+/// Parts of names of trials that are not in the quick battery, because it contains harder trials of
+/// the same kind.
 const SLOW: [&str; 22] = [
     ", 1e0",
     ", 1e4",
@@ -57,7 +57,7 @@ const SLOW: [&str; 22] = [
     "a cell, 1e",
 ];
 
-/// A trial of a scene text; long ones are left out of the quick battery by [`Trial::long`].
+/// A trial from a scene text. It is in the quick battery, and its drift is checked.
 pub(super) fn trial(
     group: &'static str,
     name: impl Into<String>,
@@ -77,16 +77,19 @@ pub(super) fn trial(
 }
 
 impl Trial {
+    /// Excludes the trial from the quick battery.
     fn long(mut self) -> Self {
         self.quick = false;
         self
     }
 
+    /// Excludes the check of the drift.
     fn drifting(mut self) -> Self {
         self.drifts = true;
         self
     }
 
+    /// Adds checks of the finished run.
     pub(super) fn expecting(
         mut self,
         f: impl Fn(&dyn Run) -> Result<Vec<Check>, CaseError> + Send + Sync + 'static,
@@ -95,13 +98,13 @@ impl Trial {
         self
     }
 
-    /// In the quick battery only if this holds.
+    /// Excludes the trial from the quick battery unless `quick`.
     fn quick_if(mut self, quick: bool) -> Self {
         self.quick &= quick;
         self
     }
 
-    /// Velocity error against a case's exact solution at the first instant.
+    /// A trial whose initial velocity error against an exact solution must be at most `most`.
     fn exact(
         group: &'static str,
         name: String,
@@ -119,7 +122,7 @@ impl Trial {
     }
 }
 
-/// A scene of a unit box from its parts.
+/// A scene of a unit box; `rest` is appended to the `[time]` table.
 fn unit_box(name: &str, cells: u32, end: f64, rest: &str) -> String {
     format!(
         "schema = 1\nname = \"{name}\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
@@ -127,7 +130,7 @@ fn unit_box(name: &str, cells: u32, end: f64, rest: &str) -> String {
     )
 }
 
-/// A round drop in a fluid of viscosity 1.
+/// A circular drop in a fluid of viscosity 1; `more` is added to its material.
 fn drop_scene(density: f64, viscosity: f64, more: &str, radius: f64) -> String {
     unit_box(
         "drop",
@@ -141,6 +144,7 @@ fn drop_scene(density: f64, viscosity: f64, more: &str, radius: f64) -> String {
     )
 }
 
+/// Large contrasts of viscosity and density.
 fn contrasts(out: &mut Vec<Trial>) -> Result<(), CaseError> {
     const GROUP: &str = "viscosity and density contrast";
     for power in [0, 4, 8, -4, -8] {
@@ -215,6 +219,7 @@ fn cosserat_drop(coupling: f64, length: f64) -> String {
     drop_scene(1.0, 10.0, &more, 0.25)
 }
 
+/// Limits of the internal length and of the coupling viscosity.
 fn cosserat(out: &mut Vec<Trial>) {
     const GROUP: &str = "Cosserat limits";
     for power in [-9, -3, 3, 6] {
@@ -231,7 +236,7 @@ fn cosserat(out: &mut Vec<Trial>) {
         ));
     }
     out.push(trial(GROUP, "drop with eta_c = 0", cosserat_drop(0.0, 0.1), 10));
-    // Free rotation at walls: the classical solution for any R, here a vanishing one.
+    // With free rotation at walls the solution is the classical one for any R; here R is small.
     let fluid = Fluid { shear: 1.0, coupling: 1.0, internal_length: 1e-6 };
     let text = couette(fluid, 1.0).scene.text().replace(", rotation = 0", "");
     out.push(trial(GROUP, "R -> 0 between walls is classical", text, 1).expecting(|run| {
@@ -244,7 +249,7 @@ fn cosserat(out: &mut Vec<Trial>) {
         let speed = run.velocity_at([0.1, 0.5])[0] - run.velocity_at([0.1, -0.5])[0];
         Ok(vec![Check::new("speed", speed, Bound::Within(0.25, 1e-6))])
     }));
-    // The couple-stress limit: w must follow the spin, and nothing may lock.
+    // The couple-stress limit: w must equal the spin, and the elements must not lock.
     const M: f64 = 0.1;
     for power in [2, 4, 8] {
         let coupling = 10f64.powi(power);
@@ -271,7 +276,7 @@ fn cosserat(out: &mut Vec<Trial>) {
         let more = format!("coupling_viscosity = {:e}\ncouple_viscosity = {M}", 10.0 * coupling);
         out.push(trial(GROUP, format!("drop, {label}"), drop_scene(1.0, 10.0, &more, 0.25), 10));
     }
-    // There the coupled cell is one of a fluid of viscosity eta + M K^2/4.
+    // In this limit the coupled cell flows like a fluid of viscosity eta + M K^2/4.
     let coupling = 1e8;
     let fluid = Fluid { shear: 1.0, coupling, internal_length: (M / (2.0 * coupling)).sqrt() };
     let stirred = "sin(pi*x) * cos(pi*y)\"\ny = \"-cos(pi*x) * sin(pi*y)\"\n";
@@ -302,6 +307,7 @@ fn sheared(name: &str, ratio: f64, director: &str, more: &str) -> String {
     )
 }
 
+/// Layered fluids with various directors and viscosity ratios.
 fn layers(out: &mut Vec<Trial>) {
     const GROUP: &str = "layers";
     let angle = |text: &str| format!("{{ angle_degrees = \"{text}\" }}");
@@ -330,13 +336,13 @@ fn layers(out: &mut Vec<Trial>) {
             20,
         ));
     }
-    // Aligned layers in plane shear: eta_s + (eta - eta_s) sin^2(2 theta).
+    // Viscosity of aligned layers in plane shear: eta_s + (eta - eta_s) sin^2(2 theta).
     for (degrees, expected) in [(0.0, 1e-2), (45.0, 1.0), (90.0, 1e-2)] {
         let text = sheared("aligned", 1e-2, &angle(&format!("{degrees}")), "");
         out.push(
             trial(GROUP, format!("viscosity of layers at {degrees} degrees"), text, 0).expecting(
                 move |run| {
-                    // Dissipation per volume over the squared shear rate, which is 1.
+                    // Dissipation per volume over the square of the shear rate, which is 1.
                     let eta = run.row().dissipation;
                     Ok(vec![Check::new("viscosity", eta, Bound::Within(expected, 1e-9))])
                 },
@@ -345,6 +351,7 @@ fn layers(out: &mut Vec<Trial>) {
     }
 }
 
+/// Finite bulk viscosity.
 fn compressible(out: &mut Vec<Trial>) {
     const GROUP: &str = "bulk viscosity";
     for (label, bulk) in [("1e-2", 1e-2), ("1", 1.0), ("1e4", 1e4), ("1e10", 1e10)] {
@@ -377,6 +384,7 @@ fn compressible(out: &mut Vec<Trial>) {
     }
 }
 
+/// Unusual boundary conditions, meshes and obstacles.
 fn boundaries(out: &mut Vec<Trial>) -> Result<(), CaseError> {
     const GROUP: &str = "boundaries and meshes";
     let fluid = "[materials.fluid]\nshear_viscosity = 1\n[[regions]]\nmaterial = \"fluid\"\n";
@@ -454,6 +462,7 @@ fn boundaries(out: &mut Vec<Trial>) -> Result<(), CaseError> {
     Ok(())
 }
 
+/// Very small and very large time steps, and many steps.
 fn time_steps(out: &mut Vec<Trial>) -> Result<(), CaseError> {
     const GROUP: &str = "time steps";
     for (name, courant, steps) in [("0.001", 1e-3, 20), ("5", 5.0, 40), ("50", 50.0, 40)] {
@@ -510,6 +519,7 @@ fn time_steps(out: &mut Vec<Trial>) -> Result<(), CaseError> {
     Ok(())
 }
 
+/// Few and many particles, particles on mesh lines, and strong deformation.
 fn particles(out: &mut Vec<Trial>) -> Result<(), CaseError> {
     const GROUP: &str = "particles";
     for count in [1, 4, 400] {
@@ -521,7 +531,7 @@ fn particles(out: &mut Vec<Trial>) -> Result<(), CaseError> {
             out.push(trial(GROUP, format!("{count} per cell, {placement}"), text, 20).drifting());
         }
     }
-    // One particle a cell moves half a cell a step: onto faces, then onto corners of cells.
+    // One particle per cell moves half a cell per step: onto faces, then onto corners of cells.
     let text = "schema = 1\nname = \"nodes\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\n\
                 cells = 8\nparticles_per_cell = 1\n[time]\nend = 1e9\nmax_step = 0.0625\n\
                 [materials.a]\nshear_viscosity = 1\n[materials.b]\nshear_viscosity = 1000\n\
@@ -530,7 +540,7 @@ fn particles(out: &mut Vec<Trial>) -> Result<(), CaseError> {
                 left.kind = \"periodic\"\nright.kind = \"periodic\"\n\
                 bottom = { velocity_x = 1, velocity_y = 0 }\ntop = { velocity_x = 1, velocity_y = 0 }\n";
     out.push(trial(GROUP, "exactly on nodes, faces and corners", text.into(), 16));
-    // A slug is thrown from one end to the other and back by gravity that turns.
+    // A slug flows from one end to the other and back, because gravity changes its direction.
     let text = unit_box(
         "refill",
         8,
@@ -554,9 +564,10 @@ fn particles(out: &mut Vec<Trial>) -> Result<(), CaseError> {
     Ok(())
 }
 
+/// Scenes scaled by large factors.
 fn units(out: &mut Vec<Trial>) {
     const GROUP: &str = "units";
-    // Lengths by l, viscosities by m, times by t: speeds must follow exactly.
+    // Lengths are scaled by l, viscosities by m, times by t; speeds must scale accordingly.
     let scaled = |l: f64, m: f64, t: f64| {
         format!(
             "schema = 1\nname = \"units\"\ngravity = [0, {:e}]\n[domain]\nx = [0, {l:e}]\ny = [0, {l:e}]\n\

@@ -1,52 +1,63 @@
-//! All cases in one table, the spread over seeds, and plots of it.
+//! This module collects the results of all cases: tables, the spread over seeds, and plots.
 
 use super::{Case, List, PlotSpec, State, Store, SweepError};
 use crate::record::number::short;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec as Plot, spread_plot};
+use crate::sim::row::find;
 use indexmap::IndexMap;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Columns of numbers that say how a run went rather than what came out.
+/// Columns that describe the run itself, not its results.
 const ABOUT: [&str; 6] = ["steps", "particles", "cells", "unknowns", "seconds", "peak_memory"];
 
-/// What is plotted where nothing is asked for, if it is there.
+/// Columns that are plotted by default, if present.
 const WORTH_PLOTTING: [&str; 4] =
     ["outflow_volume", "outflow_mean_rate", "mean_alignment", "rms_speed"];
 
-/// A case with what came out of it.
+/// A case with its results.
 #[derive(Clone, Debug)]
 pub struct Entry {
+    /// The case.
     pub case: Case,
+    /// State of the case.
     pub state: State,
-    /// By column, SI units; empty unless it is done.
+    /// Results by column, in SI units; empty unless the case is done.
     pub found: IndexMap<String, f64>,
 }
 
-/// The same values, whatever the seed.
+/// All cases with the same values and different seeds.
 #[derive(Clone, Debug)]
 pub struct Group {
+    /// Values of the varied parameters, as they are set.
     pub values: IndexMap<String, String>,
+    /// Values that are numbers.
     pub numbers: IndexMap<String, f64>,
+    /// Number of finished runs.
     pub runs: usize,
+    /// Mean and deviation of each result, by column.
     pub found: IndexMap<String, Spread>,
 }
 
-/// Mean, and standard deviation about it.
+/// Mean and standard deviation of a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
+    /// Mean over the runs.
     pub mean: f64,
-    /// Absent for a single run.
+    /// Standard deviation over the runs (n - 1 in the denominator); `None` for a single run.
     pub deviation: Option<f64>,
 }
 
-/// Everything that is known of a sweep.
+/// Results of a sweep.
 #[derive(Clone, Debug)]
 pub struct Collection {
+    /// Names of the varied parameters.
     pub parameters: Vec<String>,
+    /// All cases, in the order of the list.
     pub entries: Vec<Entry>,
+    /// Cases grouped by equal values.
     pub groups: Vec<Group>,
-    /// Names of what was found, in the order to show them.
+    /// Names of the result columns, in the order of display.
     pub columns: Vec<String>,
 }
 
@@ -58,7 +69,7 @@ impl Spread {
         Spread { mean, deviation: (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt()) }
     }
 
-    /// For people.
+    /// Formats as `mean ± deviation`.
     pub fn text(&self) -> String {
         let mean = short(self.mean);
         self.deviation.map_or(mean.clone(), |d| format!("{mean} ± {}", short(d)))
@@ -66,7 +77,7 @@ impl Spread {
 }
 
 impl Collection {
-    /// Reads what all cases have left.
+    /// Reads the results of all cases.
     pub fn new(store: &Store, list: &List) -> Result<Collection, SweepError> {
         let mut entries = vec![];
         for case in &list.cases {
@@ -87,11 +98,13 @@ impl Collection {
         Ok(Collection { parameters: list.parameters.clone(), entries, groups, columns })
     }
 
+    /// Number of finished cases.
     pub fn done(&self) -> usize {
         self.entries.iter().filter(|e| e.state == State::Done).count()
     }
 
-    /// Writes `table.csv`, a row for each case, and `spread.csv`, a row for each set of values.
+    /// Writes `table.csv`, with a row for each case, and `spread.csv`, with a row for each set of
+    /// values. Returns their paths.
     pub fn write_tables(&self, folder: &Path) -> Result<Vec<PathBuf>, SweepError> {
         let number = |v: Option<&f64>| v.map_or(String::new(), f64::to_string);
         let mut rows = vec![];
@@ -137,7 +150,8 @@ impl Collection {
         Ok(vec![table, spread])
     }
 
-    /// Plots what was asked for, else what is worth it against each parameter; stems of the files.
+    /// Draws the plots in `asked`, or if it is empty default plots against each parameter. Returns
+    /// the paths of the files without extension.
     pub fn plot(&self, folder: &Path, asked: &[PlotSpec]) -> Result<Vec<PathBuf>, PlotError> {
         let chosen = if asked.is_empty() { self.default_plots() } else { asked.to_vec() };
         let mut stems = vec![];
@@ -163,7 +177,7 @@ impl Collection {
             if values.len() < 2 {
                 continue;
             }
-            // Values over more than two decades are laid out as decades.
+            // Values over more than two decades get a logarithmic axis.
             let log_x = values[0] > 0.0 && values[values.len() - 1] > 100.0 * values[0];
             let worth = WORTH_PLOTTING.iter().filter(|y| self.columns.iter().any(|c| c == *y));
             plots.extend(worth.map(|y| PlotSpec {
@@ -176,7 +190,8 @@ impl Collection {
         plots
     }
 
-    /// A curve for each set of the other parameters, and how far the seeds spread at its points.
+    /// The plot, with a curve for each combination of the other parameters, and the deviation over
+    /// seeds at its points.
     fn curves(&self, plot: &PlotSpec) -> (Plot, Vec<Vec<f64>>) {
         let mut found: IndexMap<String, Vec<(f64, f64, f64)>> = IndexMap::new();
         for g in &self.groups {
@@ -187,7 +202,7 @@ impl Collection {
             let (Some(x), Some(y)) = (number(&plot.x), number(&plot.y)) else { continue };
             let bar = g.found.get(&plot.y).and_then(|s| s.deviation).unwrap_or(0.0);
             let others = g.values.iter().filter(|(name, _)| **name != plot.x);
-            // Against something that came out, all parameters but the last-named make curves.
+            // Against a result instead of a parameter, all points form one curve.
             let name: Vec<String> = match self.parameters.contains(&plot.x) {
                 true => others.map(|(n, v)| format!("{n} = {v}")).collect(),
                 false => vec![],
@@ -220,7 +235,7 @@ impl Collection {
         (spec, bars)
     }
 
-    /// The table for the terminal: what matters most of each set of values.
+    /// The table for the terminal: the main results for each set of values.
     pub fn terminal(&self) -> String {
         const MOST: usize = 40;
         let shown: Vec<&String> = self
@@ -253,7 +268,7 @@ impl Collection {
     }
 }
 
-/// A parameter as a number where it is one: tables are for machines.
+/// A parameter as a number, if it is one: the table is for other programs.
 fn value(values: &IndexMap<String, String>, numbers: &IndexMap<String, f64>, name: &str) -> String {
     let text = values.get(name).cloned().unwrap_or_default();
     numbers.get(name).map_or(text, f64::to_string)
@@ -279,12 +294,12 @@ fn groups(entries: &[Entry]) -> Vec<Group> {
     members.into_values().map(group).collect()
 }
 
-/// Numbers of a finished case, by the names that the series and comparisons use.
+/// Results of a finished case, by the column names of the series and of comparisons.
 fn results(store: &Store, id: &str) -> Result<IndexMap<String, f64>, SweepError> {
     let path = store.done(id).join("summary.json");
     let text = std::fs::read_to_string(&path).map_err(SweepError::file("read", &path))?;
     let summary: Value = serde_json::from_str(&text)
-        .map_err(|e| SweepError::Broken { path, cause: format!("is no summary: {e}") })?;
+        .map_err(|e| SweepError::Broken { path, cause: format!("is not a summary: {e}") })?;
     let mut found = IndexMap::new();
     let mut put = |name: String, value: Option<f64>| found.extend(value.map(|v| (name, v)));
     let time = summary["time"].as_f64();
@@ -331,14 +346,11 @@ fn results(store: &Store, id: &str) -> Result<IndexMap<String, f64>, SweepError>
 }
 
 fn unit(name: &str) -> &'static str {
-    let last = name.rsplit('.').next().unwrap_or(name);
-    match last {
-        "outflow_volume" => "m²",
-        "outflow_rate" | "outflow_mean_rate" => "m²/s",
-        "max_speed" | "rms_speed" => "m/s",
-        "time" | "seconds" | "seconds_per_step" => "s",
+    match name.rsplit('.').next().unwrap_or(name) {
+        "outflow_mean_rate" => unit("outflow_rate"),
+        "seconds" | "seconds_per_step" => "s",
         "peak_memory" | "recording_bytes" => "B",
-        _ => "",
+        _ => find(name).map_or("", |c| c.unit),
     }
 }
 

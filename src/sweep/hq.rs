@@ -1,7 +1,8 @@
-//! The engine `hq`: cases as tasks of a HyperQueue server, wherever its workers are.
+//! This module implements the engine `hq`, which runs cases as tasks of a HyperQueue server.
 //!
 //! One job file with a task for each case is written and submitted with `hq job submit-file`; then
-//! `hq job wait` is watched. No `max_fails` stands in it: a task that fails cancels no other.
+//! `hq job wait` is watched. The job has no `max_fails`: a task that fails does not cancel the
+//! others.
 
 use super::{Case, Engine, Event, State, SweepError, Work, environment};
 use indexmap::IndexMap;
@@ -10,20 +11,20 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// The command to use instead of `hq`, words between blanks.
+/// Environment variable with the command to use instead of `hq`; words are separated by blanks.
 const ENTRY: &str = "HQ_ENTRY";
-/// How often folders are looked at.
+/// Interval at which the folders are checked.
 const POLL: Duration = Duration::from_millis(500);
-/// Times that the worker of a task may die before the task counts as failed.
+/// Number of times that the worker of a task may crash before the task counts as failed.
 const CRASH_LIMIT: u32 = 20;
-/// What HyperQueue counts memory in.
+/// HyperQueue's unit of memory (bytes).
 const MIB: u64 = 1 << 20;
 
-/// Submits cases to a HyperQueue server.
+/// Engine that submits cases to a HyperQueue server.
 pub struct HyperQueue {
-    /// This program, as workers start it.
+    /// Path of this program on the workers.
     pub program: PathBuf,
-    /// Cores of each case.
+    /// Cores per case.
     pub threads: usize,
     entry: Vec<String>,
 }
@@ -52,7 +53,7 @@ struct Request {
 }
 
 impl HyperQueue {
-    /// With the command that `HQ_ENTRY` names, else `hq`.
+    /// An engine that uses the command in `HQ_ENTRY`, or else `hq`.
     pub fn new(program: PathBuf, threads: usize) -> HyperQueue {
         let named = std::env::var(ENTRY).unwrap_or_default();
         let words = match Path::new(&named).is_file() {
@@ -81,7 +82,7 @@ impl HyperQueue {
         ))
     }
 
-    /// The job file of some cases.
+    /// The text of the job file.
     fn job(&self, name: &str, root: &Path, cases: &[&Case]) -> Result<String, String> {
         let task = |case: &&Case| Task {
             id: case.number,
@@ -108,7 +109,7 @@ impl HyperQueue {
         toml::to_string(&job).map_err(|e| e.to_string())
     }
 
-    /// Submits, and gives the number of the job.
+    /// Submits the job file and returns the number of the job.
     fn submit(&self, file: &Path) -> Result<String, SweepError> {
         let path = file.to_string_lossy();
         let said = self
@@ -143,7 +144,7 @@ impl Engine for HyperQueue {
             .map_err(|cause| SweepError::Broken { path: file.clone(), cause })?;
         std::fs::write(&file, text).map_err(SweepError::file("write", &file))?;
         let job = self.submit(&file)?;
-        eprintln!("job {job} of {} tasks is submitted", work.cases.len());
+        eprintln!("submitted job {job} with {} tasks", work.cases.len());
         let mut waiting = self
             .command(&["--output-mode=quiet", "job", "wait", &job])
             .stdout(Stdio::null())
@@ -156,13 +157,13 @@ impl Engine for HyperQueue {
                 let _ = waiting.kill();
                 let _ = waiting.wait();
                 eprintln!(
-                    "job {job} goes on at the server; `{} job cancel {job}` ends it, and the same \
-                     sweep again picks up what it has finished",
+                    "job {job} continues on the server; `{} job cancel {job}` ends it; the same \
+                     sweep started again uses the cases that it has finished",
                     self.entry()
                 );
                 return Ok(());
             }
-            // Asked first: what ends after it is seen below.
+            // Checked first: cases that end after this are found below.
             let over = !matches!(waiting.try_wait(), Ok(None));
             report(work, &mut open);
             if over {
@@ -176,7 +177,7 @@ impl Engine for HyperQueue {
     }
 }
 
-/// Tells of cases that have ended, and how far the others are.
+/// Reports cases that have ended, and the overall progress.
 fn report<'a>(work: &mut Work<'a>, open: &mut Vec<&'a Case>) {
     open.retain(|case| {
         let state = work.store.state(&case.id);
@@ -198,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_task_for_each_case_and_no_end_of_all_for_one() {
+    fn a_failed_task_does_not_cancel_the_job() {
         let entry = vec!["hq".into()];
         let hq = HyperQueue { program: "/bin/grainscope".into(), threads: 2, entry };
         let case = Case {

@@ -1,4 +1,4 @@
-//! `cases.json`: every case of a sweep with its id and its values.
+//! This module creates the list of all cases of a sweep, with their ids and values: `cases.json`.
 
 use super::vary::{self, Range, Values, Vary};
 use super::{Spec, SweepError};
@@ -8,51 +8,56 @@ use crate::scene::{Placement, Quantity, Scene, SceneError, SceneSource, Scope, p
 use indexmap::{IndexMap, IndexSet};
 use serde::{Deserialize, Serialize};
 
-/// Version of `cases.json`.
+/// Version of the format of `cases.json`.
 const SCHEMA: u32 = 1;
 
-/// Digits of the hash of a scene that name its case.
+/// Number of digits of the scene hash that form the id of a case.
 const ID: usize = 12;
 
-/// Most cases of a list: `cases.json` is read as a whole by every case.
+/// Maximum number of cases: every case reads the whole `cases.json`.
 const MOST: usize = 100_000;
 
 /// All cases of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct List {
+    /// Version of the format.
     pub schema: u32,
+    /// Version of the program.
     pub version: String,
+    /// The sweep.
     pub spec: Spec,
-    /// Names of what varies.
+    /// Names of the varied parameters.
     pub parameters: Vec<String>,
+    /// All cases, in the order of their numbers.
     pub cases: Vec<Case>,
 }
 
 /// One run of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Case {
-    /// The first digits of the hash of the resolved scene: it does not depend on the order of
-    /// anything, and names the same run in any sweep.
+    /// First digits of the hash of the resolved scene. The id does not depend on the order of
+    /// parameters or cases, and is the same in every sweep that contains the run.
     pub id: String,
-    /// From 1, in the order of the list.
+    /// Number of the case, from 1, in the order of the list.
     pub number: usize,
-    /// What varies, as it is set.
+    /// Values of the varied parameters, as they are set.
     pub values: IndexMap<String, String>,
-    /// The same as numbers, where they are numbers.
+    /// Values of the varied parameters that are numbers (SI units).
     pub numbers: IndexMap<String, f64>,
-    /// Of particles and random directors, if it varies.
+    /// Seed of the particle placement and of random directors, if it varies.
     pub seed: Option<u64>,
-    /// Everything that is set in the scene of the sweep.
+    /// All settings of the case, in the form of `--set`.
     pub sets: Vec<String>,
-    /// Where it ends (s).
+    /// Simulated end time (s).
     pub end: f64,
+    /// Number of unknowns: velocity, rotation and pressure.
     pub unknowns: usize,
-    /// What it may take, bytes.
+    /// Estimated memory (bytes).
     pub memory: u64,
 }
 
 impl Case {
-    /// Its values, for people.
+    /// Description of the case: its values and seed.
     pub fn label(&self) -> String {
         let seed = self.seed.map(|s| format!("seed = {s}"));
         let values = self.values.iter().map(|(name, value)| format!("{name} = {value}"));
@@ -60,7 +65,8 @@ impl Case {
         if all.is_empty() { self.id.clone() } else { all.join(", ") }
     }
 
-    /// Its plan; `source` is the scene of the sweep.
+    /// Resolves the plan of the case; `source` is the scene of the sweep. Fails if the scene has
+    /// changed.
     pub fn plan(&self, source: &SceneSource) -> Result<plan::Plan, SweepError> {
         let (scene, plan) = resolve(source, &self.sets)?;
         match id_of(&scene) == self.id {
@@ -85,12 +91,12 @@ fn resolve(source: &SceneSource, sets: &[String]) -> Result<(Scene, plan::Plan),
     Ok((scene, plan))
 }
 
-/// Settings of one point of the sweep, by name.
+/// Settings of one point of the sweep: name and value.
 type Point = Vec<(String, String)>;
 
 impl List {
-    /// All cases of a sweep of the scene `source`; every one is resolved, so that what is wrong with
-    /// any is told before anything runs.
+    /// Lists all cases of a sweep of the scene `source`. Every case is resolved, so that errors are
+    /// reported before anything runs.
     pub fn new(source: &SceneSource, spec: &Spec) -> Result<List, SweepError> {
         let base = parse(&source.with_sets(&spec.set)?)?;
         let scope = Scope::new(&base).map_err(|e| e.with_source(source))?;
@@ -123,7 +129,7 @@ impl List {
         for point in &points {
             for &seed in &seeds {
                 let case = case(source, spec, &base, point, seed)?;
-                // A value that is listed twice is run once.
+                // A value that is listed twice is run only once.
                 if known.insert(case.id.clone()) {
                     list.cases.push(Case { number: list.cases.len() + 1, ..case });
                 }
@@ -132,7 +138,7 @@ impl List {
         Ok(list)
     }
 
-    /// The case of an id, or of its number.
+    /// Finds a case by its id or number.
     pub fn case(&self, name: &str) -> Result<&Case, SweepError> {
         let number = name.parse::<usize>().ok();
         let found = self.cases.iter().find(|c| c.id == name || Some(c.number) == number);
@@ -159,7 +165,7 @@ fn points(varied: &[Vary], spec: &Spec) -> Result<Vec<Point>, SweepError> {
         (None, None) => vec![vec![]],
         (None, Some((name, _))) => {
             return Err(SweepError::Usage(format!(
-                "--vary {name}: the range says not how many values; add their number, \
+                "--vary {name}: the range has no number of values; add it, as in \
                  {name}=from..to:count, or --sample sobol:64 to sample it"
             )));
         }
@@ -202,10 +208,10 @@ fn points(varied: &[Vary], spec: &Spec) -> Result<Vec<Point>, SweepError> {
     Ok(points.iter().flat_map(joined).collect())
 }
 
-/// Seeds of a point; `None` leaves the scene's.
+/// Seeds of each point; `None` keeps the seed of the scene.
 fn seeds(base: &Scene, spec: &Spec) -> Result<Vec<Option<u64>>, SweepError> {
     match spec.repeat_seeds {
-        0 => Err(SweepError::Usage("--repeat-seeds 0: every case runs once at least".into())),
+        0 => Err(SweepError::Usage("--repeat-seeds 0: every case must run at least once".into())),
         1 => Ok(vec![None]),
         n => Ok((0..u64::from(n)).map(|k| Some(base.accuracy.seed + k)).collect()),
     }
@@ -222,7 +228,7 @@ fn case(
     sets.extend(point.iter().map(|(name, value)| format!("{name}={value}")));
     if let Some(seed) = seed {
         sets.push(format!("accuracy.seed={seed}"));
-        // Of a regular placement every seed makes the same.
+        // With regular placement, all seeds would give the same run.
         let chosen = point.iter().any(|(name, _)| name == "accuracy.placement");
         if base.accuracy.placement == Placement::Regular && !chosen {
             sets.push("accuracy.placement=jittered".into());
@@ -249,7 +255,7 @@ fn case(
     })
 }
 
-/// The error of a scene, said of what was varied.
+/// Turns an error of a scene into one that names the varied values.
 fn blame(error: &SceneError, point: &Point) -> SweepError {
     let message = error.message().replacen("--set ", "--vary ", 1);
     let at: Vec<String> = point.iter().map(|(name, value)| format!("{name}={value}")).collect();
@@ -283,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn ids_name_scenes_whatever_the_order() {
+    fn ids_do_not_depend_on_the_order() {
         let one = list(&["alpha=0,1/3", "contrast=10,100"], |_| ()).expect("valid");
         let other = list(&["contrast=100,10", "alpha=1/3,0"], |_| ()).expect("valid");
         let (mut a, mut b) = (ids(&one), ids(&other));
@@ -292,7 +298,7 @@ mod tests {
         b.sort();
         assert_eq!(a, b);
         assert_eq!(a.len(), 4);
-        // A set of all cases that a case had anyhow changes nothing.
+        // A setting that repeats a value of the scene does not change the ids.
         let same =
             list(&["alpha=0,1/3", "contrast=10,100"], |s| s.set.push("gravity=[0, -10]".into()));
         assert_eq!(ids(&same.expect("valid")), ids(&one));
@@ -318,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_listed_says_why() {
+    fn invalid_sweeps_are_rejected_with_a_reason() {
         for (vary, sample, message) in [
             (&["alpha=0..1"][..], None, "--sample sobol:64"),
             (&["alpha=0,1"], Some("sobol:4"), "nothing to sample"),

@@ -1,4 +1,5 @@
-//! The local engine: processes of this program, as many as the machine holds.
+//! This module implements the local engine, which runs as many processes of this program as cores
+//! and memory allow.
 
 use super::{Case, Engine, Event, State, SweepError, Work, environment};
 use crate::plan::memory::available;
@@ -6,30 +7,30 @@ use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// How often children are looked after.
+/// Interval at which child processes are checked.
 const POLL: Duration = Duration::from_millis(50);
-/// How often the share that is done is read from the folders.
+/// Interval at which the progress is read from the folders.
 const REPORT: Duration = Duration::from_millis(500);
-/// How long interrupted children may finish their step.
+/// Time that interrupted processes have to finish their step.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Share of the free memory that cases may take.
+/// Fraction of the free memory that cases may use.
 const MEMORY_SHARE: f64 = 0.8;
-/// Lines of a failed child's words that are kept.
+/// Number of words kept from the error output of a failed process.
 const LAST_WORDS: usize = 400;
 
-/// What a machine gives to a sweep.
+/// Resource limits of a sweep on one machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Most cases at once.
+    /// Maximum number of concurrent cases.
     pub jobs: usize,
-    /// Threads of each.
+    /// Threads per case.
     pub threads: usize,
-    /// Bytes for all that run.
+    /// Memory for all running cases (bytes).
     pub memory: u64,
 }
 
 impl Limits {
-    /// All cores and most of the free memory of this machine.
+    /// Limits of this machine: all cores, and 80 % of the free memory.
     pub fn of_machine(jobs: Option<usize>, threads: usize) -> Limits {
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
         let ours = available().unwrap_or(f64::INFINITY);
@@ -40,17 +41,18 @@ impl Limits {
         }
     }
 
-    /// Whether a case fits beside what runs; one alone always does.
+    /// Whether another case fits beside the running ones. A single case always does.
     fn admits(&self, running: &[u64], next: u64) -> bool {
         let taken: u64 = running.iter().sum();
         running.is_empty() || running.len() < self.jobs && taken + next <= self.memory
     }
 }
 
-/// Runs cases on this machine.
+/// Engine that runs cases on this machine.
 pub struct Local {
-    /// This program.
+    /// Path of this program.
     pub program: PathBuf,
+    /// Limits of cores and memory.
     pub limits: Limits,
 }
 
@@ -90,7 +92,9 @@ impl Engine for Local {
                     }
                     Err(e) => {
                         stop(&mut running);
-                        return Err(SweepError::Engine(format!("a case cannot be awaited: {e}")));
+                        return Err(SweepError::Engine(format!(
+                            "cannot wait for the process of a case: {e}"
+                        )));
                     }
                 }
             }
@@ -117,7 +121,7 @@ impl Local {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
-        // Ctrl-C is for this process, which tells the others.
+        // Ctrl-C reaches only this process, which then stops the others.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let child = command.spawn().map_err(|e| {
@@ -127,7 +131,7 @@ impl Local {
     }
 }
 
-/// Finds out what has become of a case whose process has ended.
+/// Determines the state of a case whose process has ended.
 fn settle(
     work: &mut Work,
     case: &Case,
@@ -137,7 +141,7 @@ fn settle(
     if !status.success() && work.store.state(&case.id) == State::Missing {
         let mut words = vec![];
         if let Some(mut stderr) = child.stderr.take() {
-            // What it said is a help only.
+            // The output of the process is additional information only.
             let _ = std::io::Read::read_to_end(&mut stderr, &mut words);
         }
         let words = String::from_utf8_lossy(&words);
@@ -152,16 +156,16 @@ fn settle(
     Ok(())
 }
 
-/// Lets children finish their step; those that take long are ended.
+/// Lets processes finish their step; those that take too long are killed.
 fn stop(running: &mut [Running]) {
-    // The end of its input tells a case to end.
+    // A case ends when its standard input is closed.
     running.iter_mut().for_each(|r| drop(r.child.stdin.take()));
     let start = Instant::now();
     for r in running {
         while start.elapsed() < PATIENCE && matches!(r.child.try_wait(), Ok(None)) {
             std::thread::sleep(POLL);
         }
-        // Those that have ended cannot be killed.
+        // Killing a process that has ended fails, which is ignored.
         let _ = r.child.kill();
         let _ = r.child.wait();
     }

@@ -1,9 +1,9 @@
-//! From one run to a thousand: cases with names that last, and engines that run what is missing.
+//! This module runs sweeps: many runs (cases) of one scene with varied parameters.
 //!
-//! A case is a scene with everything resolved; its id is the hash of that scene. Every case is an
-//! ordinary run folder, made beside its place and moved there when it is finished, so what is there
-//! is whole. Whether a case is done is read from the folders alone: engines, machines and tries may
-//! change between two starts of a sweep.
+//! A case is a fully resolved scene; its id is the hash of that scene. Each case is an ordinary run
+//! folder. It is written in a temporary place and moved to its final place when finished, so a
+//! folder there is always complete. Whether a case is done is decided from the folders alone: the
+//! engine, the machine and the number of attempts may differ between two starts of a sweep.
 
 pub mod collect;
 mod hq;
@@ -25,17 +25,34 @@ use crate::simd::{self, Simd};
 use indexmap::IndexMap;
 use std::path::PathBuf;
 
-/// Why a sweep cannot go on; a case that fails is none of these.
+/// Error that stops a sweep. The failure of a case is not such an error.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
+    /// The scene is not valid.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The arguments are not valid.
     #[error("{0}")]
     Usage(String),
+    /// A file operation failed.
     #[error("cannot {what} {}: {source}", path.display())]
-    File { what: &'static str, path: PathBuf, source: std::io::Error },
+    File {
+        /// The operation, such as `write`.
+        what: &'static str,
+        /// Path of the file or folder.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The content of a file is not valid.
     #[error("{}: {cause}", path.display())]
-    Broken { path: PathBuf, cause: String },
+    Broken {
+        /// Path of the file.
+        path: PathBuf,
+        /// Description of the error.
+        cause: String,
+    },
+    /// The engine failed.
     #[error("{0}")]
     Engine(String),
 }
@@ -49,24 +66,31 @@ impl SweepError {
     }
 }
 
-/// What an engine tells while it works.
+/// Progress message of an engine.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event<'a> {
     /// A case has started.
     Started(&'a Case),
-    /// A case has ended, one way or the other.
+    /// A case has ended, with this state.
     Ended(&'a Case, State),
-    /// Share of everything that was asked for, and cases that run now.
-    Progress { share: f64, running: usize },
+    /// Overall progress.
+    Progress {
+        /// Completed fraction of all cases, 0 to 1.
+        share: f64,
+        /// Number of cases that are running.
+        running: usize,
+    },
 }
 
-/// What an engine runs cases with.
+/// Input of an engine.
 pub struct Work<'a> {
+    /// Folder of the sweep.
     pub store: &'a Store,
-    /// What is to be run.
+    /// Cases to be run.
     pub cases: Vec<&'a Case>,
-    /// Set from outside when everything is to end.
+    /// Set from outside to stop the sweep.
     pub interrupted: &'a std::sync::atomic::AtomicBool,
+    /// Receiver of progress messages.
     pub watch: &'a mut dyn FnMut(Event),
 }
 
@@ -76,13 +100,14 @@ impl Work<'_> {
     }
 }
 
-/// Something that runs cases. What has become of them is in the store.
+/// An engine that runs cases. The state of the cases is in the store.
 pub trait Engine {
+    /// Runs all cases of `work`. Returns when all have ended or the sweep was interrupted.
     fn run(&self, work: &mut Work) -> Result<(), SweepError>;
 }
 
-/// What a case's program is told by its environment: the threads that it may take, and the instruction
-/// set if ours is limited.
+/// Environment variables of the process of a case: the number of threads, and the instruction set
+/// if it is limited in this process.
 fn environment(threads: usize) -> IndexMap<&'static str, String> {
     let threads = Some(("RAYON_NUM_THREADS", threads.to_string()));
     let set = Simd::limited().map(|set| (simd::VARIABLE, set.name().to_owned()));

@@ -1,14 +1,14 @@
-//! What a sweep is: a scene, what varies in it, and what is plotted of it.
+//! This module defines sweep files: a scene, its varied parameters and the plots of the results.
 
 use super::{Sample, SweepError};
 use crate::scene::{SceneError, closest};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Version of sweep files.
+/// Version of the format of sweep files.
 const SCHEMA: u32 = 1;
 
-/// Sweeps that come with the program.
+/// Built-in sweeps: name and text.
 const PRESETS: [(&str, &str); 5] = [
     ("fig3", include_str!("../../presets/sweeps/fig3.toml")),
     ("discharge", include_str!("../../presets/sweeps/discharge.toml")),
@@ -21,62 +21,73 @@ const PRESETS: [(&str, &str); 5] = [
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spec {
+    /// Version of the format.
     #[serde(default)]
     pub schema: u32,
+    /// Name of the sweep.
     pub name: String,
+    /// Description of the sweep.
     #[serde(default)]
     pub description: String,
     /// Preset name or path of the scene.
     pub scene: String,
-    /// Settings of all cases, as `--set` takes them.
+    /// Settings of all cases, in the form of `--set`.
     #[serde(default)]
     pub set: Vec<String>,
-    /// What varies, as `--vary` takes it.
+    /// Varied parameters, in the form of `--vary`.
     #[serde(default)]
     pub vary: Vec<String>,
-    /// As `--sample` takes it.
+    /// Sampling of ranges, in the form of `--sample`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
-    /// As `--repeat-seeds` takes it.
+    /// Number of seeds per case, as given by `--repeat-seeds`.
     #[serde(default = "one")]
     pub repeat_seeds: u32,
-    /// Whether cases leave recordings.
+    /// Whether cases write recordings.
     #[serde(default = "yes")]
     pub recordings: bool,
-    /// Whether all cases of the first seed are put side by side at the end.
+    /// Whether the cases of the first seed are combined in one side-by-side recording at the end.
     #[serde(default)]
     pub side_by_side: bool,
-    /// Settings that make it coarse and short.
+    /// Changes that make the sweep coarse and short.
     #[serde(default)]
     pub quick: Quick,
+    /// Plots of the results.
     #[serde(default)]
     pub plots: Vec<PlotSpec>,
 }
 
-/// What `--quick` changes.
+/// Changes made by `--quick`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quick {
+    /// Additional settings, in the form of `--set`.
     #[serde(default)]
     pub set: Vec<String>,
-    /// Instead of the others.
+    /// Varied parameters that replace the others; unused if empty.
     #[serde(default)]
     pub vary: Vec<String>,
+    /// Number of seeds per case, if it differs.
     #[serde(default)]
     pub repeat_seeds: Option<u32>,
 }
 
-/// A quantity against a parameter; a curve for each value of the other parameters.
+/// A plot of a quantity against a parameter, with a curve for each combination of the other
+/// parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlotSpec {
+    /// Title; a default if empty.
     #[serde(default)]
     pub title: String,
-    /// A column of the table.
+    /// Column of the table on the horizontal axis.
     pub x: String,
+    /// Column of the table on the vertical axis.
     pub y: String,
+    /// Whether the horizontal axis is logarithmic.
     #[serde(default)]
     pub log_x: bool,
+    /// Whether the vertical axis is logarithmic.
     #[serde(default)]
     pub log_y: bool,
 }
@@ -90,7 +101,7 @@ fn yes() -> bool {
 }
 
 impl Spec {
-    /// The sweep, coarse and short.
+    /// The sweep with the changes of `--quick`.
     pub fn quick(mut self) -> Spec {
         self.set.append(&mut self.quick.set);
         if !self.quick.vary.is_empty() {
@@ -100,7 +111,7 @@ impl Spec {
         self
     }
 
-    /// How ranges are sampled.
+    /// Sampling of ranges; `None` if it is not set.
     pub fn sampling(&self) -> Result<Option<Sample>, SweepError> {
         let read = |text: &String| {
             text.parse().map_err(|e| SweepError::Usage(format!("--sample {text}: {e}")))
@@ -109,19 +120,19 @@ impl Spec {
     }
 }
 
-/// Names and descriptions of the sweeps that come with the program.
+/// Names and descriptions of the built-in sweeps.
 pub fn preset_list() -> Vec<(&'static str, String)> {
     let described =
         |(name, text): (&'static str, &str)| Some((name, read(name, text).ok()?.description));
     PRESETS.into_iter().filter_map(described).collect()
 }
 
-/// The text of the sweep of a name.
+/// The text of a built-in sweep.
 pub fn preset_source(name: &str) -> Option<&'static str> {
     PRESETS.iter().find(|preset| preset.0 == name).map(|preset| preset.1)
 }
 
-/// Finds a sweep by preset name or path; `None` if it is neither, and so perhaps a scene.
+/// Reads a sweep by preset name or path; `None` if the name is neither, and so possibly a scene.
 pub fn read_file(name: &str) -> Result<Option<Spec>, SweepError> {
     if let Some(text) = preset_source(name) {
         return read(name, text).map(Some);
@@ -130,7 +141,7 @@ pub fn read_file(name: &str) -> Result<Option<Spec>, SweepError> {
     if path.extension().is_none_or(|e| e != "toml") || !path.is_file() {
         return Ok(None);
     }
-    // What cannot be read as text or TOML is for the reader of scenes to complain of.
+    // The reader of scenes reports files that are not text or not TOML.
     let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
     let is_sweep = toml::from_str::<toml::Table>(&text).is_ok_and(|t| t.contains_key("vary"));
     is_sweep.then(|| read(name, &text)).transpose()
@@ -141,7 +152,7 @@ fn read(name: &str, text: &str) -> Result<Spec, SweepError> {
         SweepError::Scene(SceneError::new(format!("the sweep {name}: {message}"), help))
     };
     let spec: Spec = toml::from_str(text).map_err(|e| {
-        let help = "grainscope sweep presets fig3 shows one that is right";
+        let help = "`grainscope sweep presets fig3` shows a valid example";
         broken(e.to_string().trim_end().to_owned(), help)
     })?;
     if spec.schema != SCHEMA {
@@ -151,7 +162,7 @@ fn read(name: &str, text: &str) -> Result<Spec, SweepError> {
     Ok(spec)
 }
 
-/// The sweep of a similar name, to be proposed.
+/// The built-in sweep with the most similar name, for error messages.
 pub fn similar(name: &str) -> Option<&'static str> {
     closest(name, PRESETS.iter().map(|p| p.0))
 }

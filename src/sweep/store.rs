@@ -1,10 +1,10 @@
-//! The folder of a sweep, and what is done in it.
+//! This module manages the folder of a sweep and the state of its cases.
 //!
 //! ```text
-//! cases.json scene.toml     what is to be run
-//! cases/<id>                finished runs: they appear whole, by one renaming
-//! failed/<id>               what a failed run has left, with its cause
-//! running/<id>              runs in the making, each under a lock
+//! cases.json scene.toml     cases to be run, and their scene
+//! cases/<id>                finished runs, moved here by a single rename
+//! failed/<id>               files of a failed run, with the cause
+//! running/<id>              unfinished runs, each under a lock
 //! ```
 
 use super::{Case, List, SweepError};
@@ -14,7 +14,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// File of a case beside those of its run.
+/// Name of the file with the [`Note`] of a case, in the folder of its run.
 const NOTE: &str = "case.json";
 
 /// The folder of a sweep.
@@ -23,40 +23,47 @@ pub struct Store {
     root: PathBuf,
 }
 
-/// What has become of a case.
+/// State of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub enum State {
+    /// The run is finished.
     Done,
+    /// The run failed, with this cause.
     Failed(String),
+    /// The run has not ended, or not started.
     Missing,
 }
 
-/// What is known of a case beyond its run's summary.
+/// Information about a case that is not in the summary of its run.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Note {
+    /// Id of the case.
     pub id: String,
+    /// Cause of the failure, if it failed.
     #[serde(default)]
     pub cause: Option<String>,
-    /// Most memory that its process held, bytes; where the system says it.
+    /// Peak memory of its process (bytes); `None` where the system does not report it.
     #[serde(default)]
     pub peak_memory: Option<u64>,
 }
 
 impl Store {
+    /// The store in the folder `root`.
     pub fn new(root: &Path) -> Store {
         Store { root: root.to_owned() }
     }
 
+    /// Path of the folder.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The folder of a finished case.
+    /// Folder of a finished case.
     pub fn done(&self, id: &str) -> PathBuf {
         self.root.join("cases").join(id)
     }
 
-    /// The folder of a case that failed.
+    /// Folder of a failed case.
     pub fn failed(&self, id: &str) -> PathBuf {
         self.root.join("failed").join(id)
     }
@@ -65,7 +72,7 @@ impl Store {
         self.root.join("running").join(id)
     }
 
-    /// Writes down what is to be run.
+    /// Writes the list of cases and the scene of the sweep.
     pub fn write(&self, list: &List, source: &SceneSource) -> Result<(), SweepError> {
         fs::create_dir_all(&self.root).map_err(SweepError::file("make", &self.root))?;
         let json = serde_json::to_string_pretty(list)
@@ -74,20 +81,22 @@ impl Store {
         replace(&self.cases(), &format!("{json}\n"))
     }
 
-    /// Reads what is to be run, and the scene of the sweep.
+    /// Reads the list of cases and the scene of the sweep.
     pub fn read(&self) -> Result<(List, SceneSource), SweepError> {
         let path = self.cases();
         if !path.is_file() {
             return Err(SweepError::Usage(format!(
                 "{}: holds no sweep; expected a folder with {}, as `grainscope sweep <scene> --vary \
-                 ... --out DIR` leaves it",
+                 ... --out DIR` writes it",
                 self.root.display(),
                 self.cases().file_name().unwrap_or_default().to_string_lossy()
             )));
         }
         let text = fs::read_to_string(&path).map_err(SweepError::file("read", &path))?;
-        let list = serde_json::from_str(&text)
-            .map_err(|e| SweepError::Broken { path, cause: format!("is no list of cases: {e}") })?;
+        let list = serde_json::from_str(&text).map_err(|e| SweepError::Broken {
+            path,
+            cause: format!("is not a list of cases: {e}"),
+        })?;
         let scene = self.scene();
         let text = fs::read_to_string(&scene).map_err(SweepError::file("read", &scene))?;
         Ok((list, SceneSource::new(scene.display().to_string(), text)))
@@ -101,31 +110,33 @@ impl Store {
         self.root.join("scene.toml")
     }
 
+    /// State of a case, read from the folders.
     pub fn state(&self, id: &str) -> State {
         if self.done(id).join("summary.json").is_file() {
             State::Done
         } else if self.failed(id).is_dir() {
             let cause = self.note(&self.failed(id)).cause;
-            State::Failed(cause.unwrap_or_else(|| "its cause was not written down".into()))
+            State::Failed(cause.unwrap_or_else(|| "its cause was not recorded".into()))
         } else {
             State::Missing
         }
     }
 
-    /// What is known of a case from its folder.
+    /// Reads the note in the folder of a case.
     pub fn note(&self, folder: &Path) -> Note {
         let text = fs::read_to_string(folder.join(NOTE)).unwrap_or_default();
         serde_json::from_str(&text).unwrap_or_default()
     }
 
-    /// Finished runs that are not of the list.
+    /// Number of finished runs that are not in the list.
     pub fn strangers(&self, list: &List) -> usize {
         let Ok(entries) = fs::read_dir(self.root.join("cases")) else { return 0 };
         let name = |e: std::io::Result<fs::DirEntry>| e.ok()?.file_name().into_string().ok();
         entries.filter_map(name).filter(|n| list.cases.iter().all(|c| c.id != *n)).count()
     }
 
-    /// Starts on a case: waits for whoever else is at it; `None` if that one has finished it.
+    /// Starts a case. If another process is running it, waits for that process; `None` if the case
+    /// is then finished.
     pub fn begin(&self, id: &str) -> Result<Option<Attempt>, SweepError> {
         if self.state(id) == State::Done {
             return Ok(None);
@@ -137,16 +148,16 @@ impl Store {
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
-                eprintln!("case {id} runs elsewhere; waiting for it");
+                eprintln!("another process is running case {id}; waiting for it");
                 lock.lock().map_err(SweepError::file("lock", &path))?;
             }
-            // A file system without locks: what is lost is a guard against doing things twice.
+            // A file system without locks. The lock only prevents running a case twice.
             Err(TryLockError::Error(e)) => {
-                eprintln!("warning: {} has no lock: {e}", path.display())
+                eprintln!("warning: {} cannot be locked: {e}", path.display())
             }
         }
         if self.state(id) == State::Done {
-            // It is the one that we have waited for.
+            // The other process has finished the case.
             let _ = fs::remove_file(&path);
             return Ok(None);
         }
@@ -156,14 +167,14 @@ impl Store {
         Ok(Some(Attempt { store: self.clone(), id: id.to_owned(), folder, _lock: lock }))
     }
 
-    /// Writes down a failure of a case whose process is gone without a word.
+    /// Records the failure of a case whose process ended without recording a cause.
     pub fn blame(&self, id: &str, cause: &str) -> Result<(), SweepError> {
         let (from, to) = (self.running(id), self.failed(id));
         fs::create_dir_all(&from).map_err(SweepError::file("make", &from))?;
         self.shelve(id, &from, &to, Some(cause), None)
     }
 
-    /// Share of a case that is computed, by the last row of its series.
+    /// Computed fraction of a case, 0 to 1, by the last row of its series.
     pub fn progress(&self, case: &Case) -> f64 {
         match self.state(&case.id) {
             State::Done | State::Failed(_) => 1.0,
@@ -195,7 +206,7 @@ impl Store {
     }
 }
 
-/// A case that is being run, by this process alone.
+/// A case that this process alone is running.
 pub struct Attempt {
     store: Store,
     id: String,
@@ -204,12 +215,12 @@ pub struct Attempt {
 }
 
 impl Attempt {
-    /// Where the run is made.
+    /// Folder in which the run is written.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Puts the finished run in its place.
+    /// Moves the finished run to its final place.
     pub fn finish(self) -> Result<(), SweepError> {
         let to = self.store.done(&self.id);
         self.store.shelve(&self.id, &self.folder, &to, None, peak_memory())?;
@@ -218,7 +229,7 @@ impl Attempt {
         Ok(())
     }
 
-    /// Keeps what the failed run has left, and why it failed.
+    /// Keeps the files of the failed run and records the cause.
     pub fn fail(self, cause: &str) -> Result<(), SweepError> {
         let to = self.store.failed(&self.id);
         self.store.shelve(&self.id, &self.folder, &to, Some(cause), peak_memory())?;
@@ -226,27 +237,27 @@ impl Attempt {
         Ok(())
     }
 
-    /// Forgets the run.
+    /// Discards the run.
     pub fn abandon(self) {
-        // Best effort: the next try begins with it.
+        // Errors are ignored: the next attempt removes the folder first.
         let _ = remove(&self.folder);
         self.unlock();
     }
 
     fn unlock(self) {
-        // A file that stays is locked anew by the next one.
+        // A lock file that remains can be locked again.
         let _ = fs::remove_file(self.store.root.join("running").join(format!("{}.lock", self.id)));
     }
 }
 
-/// Most memory that this process has held, bytes; where the system says it.
+/// Peak memory of this process (bytes); `None` where the system does not report it.
 pub fn peak_memory() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
     Some(1024 * line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
 }
 
-/// The summary names the places where things are, not those where they were made.
+/// Corrects the paths in the summary after the run was moved.
 fn correct_paths(from: &Path, to: &Path) {
     let path = from.join("summary.json");
     let Ok(text) = fs::read_to_string(&path) else { return };
@@ -259,7 +270,7 @@ fn correct_paths(from: &Path, to: &Path) {
         }
     }
     let json = serde_json::to_string_pretty(&summary).unwrap_or(text);
-    // The old one is right but for two paths.
+    // If this fails, only two paths in the old summary are wrong.
     let _ = fs::write(&path, format!("{json}\n"));
 }
 
@@ -272,7 +283,7 @@ fn remove(folder: &Path) -> Result<(), SweepError> {
     }
 }
 
-/// Writes a file so that readers see the old one or the new one.
+/// Replaces a file atomically: readers see either the old or the new content.
 fn replace(path: &Path, text: &str) -> Result<(), SweepError> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(format!(".{}", std::process::id()));
@@ -281,7 +292,7 @@ fn replace(path: &Path, text: &str) -> Result<(), SweepError> {
     fs::rename(&beside, path).map_err(SweepError::file("write", path))
 }
 
-/// The time of the last whole row of a series.
+/// Time in the last complete row of a series (s).
 fn last_time(path: &Path) -> Option<f64> {
     const TAIL: u64 = 4096;
     let mut file = File::open(path).ok()?;
@@ -300,7 +311,7 @@ mod tests {
     use crate::testing::TempFolder;
 
     #[test]
-    fn cases_appear_whole_or_not_at_all() {
+    fn only_complete_cases_appear() {
         let here = TempFolder::new().expect("a folder");
         let store = Store::new(here.path());
         let attempt = store.begin("a").expect("begins").expect("not done");
@@ -320,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn failures_keep_their_cause_until_they_are_mended() {
+    fn failures_keep_their_cause_until_a_run_succeeds() {
         let here = TempFolder::new().expect("a folder");
         let store = Store::new(here.path());
         store.begin("a").expect("begins").expect("not done").fail("too stiff").expect("moved");
@@ -335,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn two_never_run_one_case() {
+    fn a_case_is_never_run_twice_at_once() {
         let here = TempFolder::new().expect("a folder");
         let store = Store::new(here.path());
         let first = store.begin("a").expect("begins").expect("not done");

@@ -1,32 +1,37 @@
-//! `--vary name=values` and `--sample`: which values a parameter takes.
+//! This module parses `--vary name=values` and `--sample` and computes the values of the
+//! parameters.
 
 use super::SweepError;
 use crate::scene::{Quantity, Scope};
 
-/// Digits of values that are computed: enough for any study, and still readable.
+/// Significant digits of computed values: enough for any study, and readable.
 const DIGITS: usize = 12;
-/// Digits of sampled values, whose generator has 24 bits.
+/// Significant digits of sampled values; their generator has 24 bits.
 const SAMPLED_DIGITS: usize = 7;
-/// Most values of one range.
+/// Maximum number of values of one range.
 const MOST: usize = 100_000;
-/// Names the sequence; the same points on every machine.
+/// Seed of the Sobol sequence. It gives the same points on every machine.
 const SEQUENCE: u32 = 1;
 
 /// Values of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Vary {
+    /// Name of the parameter.
     pub name: String,
+    /// Its values.
     pub values: Values,
 }
 
+/// Values of a parameter: listed, or a range to be sampled.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
-    /// As they are set.
+    /// Listed values, as they are set.
     List(Vec<String>),
-    /// To be sampled.
+    /// A range to be sampled.
     Range(Range),
 }
 
+/// A range of values, linear or logarithmic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Range {
     from: f64,
@@ -35,7 +40,7 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// The value at a share of the way, written down.
+    /// The value at a fraction `share` of the range, as text with `digits` significant digits.
     fn at(&self, share: f64, digits: usize) -> String {
         let Range { from, to, log } = *self;
         let value = match (share, log) {
@@ -49,10 +54,11 @@ impl Range {
     }
 }
 
-/// How ranges without a count become points.
+/// Sampling of ranges that have no count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sample {
-    /// So many points of a scrambled Sobol sequence, which fill all ranges together evenly.
+    /// This number of points of a scrambled Sobol sequence, which fill all ranges jointly and
+    /// evenly.
     Sobol(u32),
 }
 
@@ -69,7 +75,7 @@ impl std::str::FromStr for Sample {
 }
 
 impl Sample {
-    /// Points in the unit cube.
+    /// Points of the sample: one value for each range.
     pub(super) fn points(self, ranges: &[Range]) -> Vec<Vec<String>> {
         let Sample::Sobol(count) = self;
         let coordinate = |i: u32, k: usize| {
@@ -91,7 +97,7 @@ fn fault(text: &str, message: impl std::fmt::Display, help: &str) -> SweepError 
     SweepError::Usage(format!("--vary {text}: {message}\n  help: {help}"))
 }
 
-/// Reads one `--vary`; its numbers may use the scene's parameters.
+/// Parses one `--vary`. Its numbers may use the parameters of the scene.
 pub(super) fn read(text: &str, scope: &Scope) -> Result<Vary, SweepError> {
     let Some((name, written)) = text.split_once('=') else {
         return Err(fault(text, "there is no `=`", FORMS));
@@ -114,27 +120,27 @@ pub(super) fn read(text: &str, scope: &Scope) -> Result<Vary, SweepError> {
                 return Ok(Vary { name, values: Values::Range(range) });
             }
             Item::Open(_) => {
-                let message = format!("`{item}` says not how many values");
-                return Err(fault(text, message, "add their number: from..to:count"));
+                let message = format!("`{item}` has no number of values");
+                return Err(fault(text, message, "add it: from..to:count"));
             }
         }
     }
     Ok(Vary { name, values: Values::List(list) })
 }
 
-/// The values of a `--vary` as they are written, where it is a plain list: `alpha=0,1/3`.
+/// The values of a `--vary` as written, if it is a plain list such as `alpha=0,1/3`.
 pub fn values_of(vary: &str) -> Vec<&str> {
     vary.split_once('=').map(|(_, values)| split(values)).unwrap_or_default()
 }
 
 enum Item {
-    /// Taken as it is.
+    /// A single value, used as it is written.
     One,
     Counted(Range, usize),
     Open(Range),
 }
 
-/// Reads `[log:]from..to[:count]`; message and help if it is wrong.
+/// Parses `[log:]from..to[:count]`. The error is a message and a help text.
 fn range(item: &str, scope: &Scope) -> Result<Item, (String, &'static str)> {
     const COUNT: &str = "the count of a range is a whole number, 2 or more: 0..1:5";
     let (log, rest) = match item.strip_prefix("log:") {
@@ -144,7 +150,7 @@ fn range(item: &str, scope: &Scope) -> Result<Item, (String, &'static str)> {
     let quoted = item.starts_with(['"', '\'', '[', '{']);
     let Some((from, rest)) = rest.split_once("..").filter(|_| !quoted) else {
         return if log {
-            Err((format!("`{item}` is no range"), "write log:from..to:count: log:1..1e6:7"))
+            Err((format!("`{item}` is not a range"), "write log:from..to:count: log:1..1e6:7"))
         } else {
             Ok(Item::One)
         };
@@ -168,11 +174,11 @@ fn range(item: &str, scope: &Scope) -> Result<Item, (String, &'static str)> {
     match count.map(|c| c.trim().parse::<usize>()) {
         None => Ok(Item::Open(range)),
         Some(Ok(n)) if (2..=MOST).contains(&n) => Ok(Item::Counted(range, n)),
-        Some(_) => Err((format!("`{item}` has no count that can be read"), COUNT)),
+        Some(_) => Err((format!("`{item}` has an invalid count"), COUNT)),
     }
 }
 
-/// Items between commas that are not in brackets or quotes.
+/// Splits at commas outside brackets and quotes.
 fn split(text: &str) -> Vec<&str> {
     let (mut depth, mut quote, mut start) = (0i32, None, 0);
     let mut items = vec![];
@@ -217,17 +223,17 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_says_how_to_write_it() {
+    fn invalid_values_are_rejected_with_help() {
         for (text, message, help) in [
             ("alpha", "there is no `=`", "from..to:count"),
             ("=1", "there is no name", "name=a,b,c"),
             ("a=1,,2", "a value is missing", "name=a,b,c"),
-            ("a=0..1:x", "no count that can be read", "whole number"),
-            ("a=0..1:1", "no count that can be read", "2 or more"),
+            ("a=0..1:x", "invalid count", "whole number"),
+            ("a=0..1:1", "invalid count", "2 or more"),
             ("a=log:0..1:3", "reaches zero", "0,log:1..10:3"),
-            ("a=log:5", "no range", "log:from..to:count"),
+            ("a=log:5", "not a range", "log:from..to:count"),
             ("a=1..1:3", "is empty", "must differ"),
-            ("a=1,0..1", "says not how many", "from..to:count"),
+            ("a=1,0..1", "has no number of values", "from..to:count"),
             ("a=0..b:3", "unknown name `b`", ""),
         ] {
             let scope = Scope::from_values([("a", 2.0)]);

@@ -1,4 +1,4 @@
-//! Interfaces inside cells: the rules compared.
+//! Compares the quadrature rules on material interfaces that lie inside cells.
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
@@ -9,25 +9,31 @@ use crate::cases::{
 use crate::scene::SceneSource;
 use crate::sim::SimError;
 
-/// The rule the table compares everything with.
+/// The default rule, with which the others are compared.
 const DEFAULT: &str = "laminate";
+/// Assignment that selects the default rule.
 const DEFAULT_SET: &str = "accuracy.quadrature=laminate";
-/// `accuracy.quadrature`.
+/// Values of `accuracy.quadrature` that are compared.
 const RULES: [&str; 3] = ["laminate", "mixture", "particles"];
-/// Left out of the figure, whose legend holds seven: they look like the same at a contrast of 1e3.
+/// Cases left out of the figure, whose legend has room for seven: their curves look the same as at
+/// a contrast of 1e3.
 const LIKE_OTHERS: [&str; 2] = ["SolVi 1e6", "inclined layers 1e8, shear"];
+/// Random seeds of the particle placement.
 const SEEDS: [u32; 3] = [1, 2, 3];
 
-/// A case with its resolutions, and the largest velocity error wanted at the finest of them.
+/// A case, its resolutions, and the required accuracy.
 struct Entry {
     label: &'static str,
     case: Case,
+    /// Numbers of cells per side.
     cells: [u32; 3],
+    /// Largest velocity error at the finest resolution.
     wanted: Option<f64>,
-    /// What is wanted is a goal that may be missed.
+    /// True if the bounds are goals, which may be missed.
     goal: bool,
 }
 
+/// All cases.
 fn entries() -> Result<Vec<Entry>, CaseError> {
     let even = [16, 32, 64];
     let layers = |contrast| Inclined { degrees: 30.0, contrast };
@@ -46,18 +52,20 @@ fn entries() -> Result<Vec<Entry>, CaseError> {
     ])
 }
 
+/// Verifies the quadrature rules on interfaces inside cells.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
         title: "Interfaces inside cells",
-        about: "Relative velocity errors, mean over three seeds of jittered particles, 16 a cell. \
-                `laminate` (default): shear along the interface that the particles show in series, \
-                stretch along it in parallel; sheets and drops below a cell have rules of their own. \
-                `mixture`: Gauss points that see the local harmonic mixture of the cell's \
-                particles. `particles`: particles as integration points (the source). Wanted at \
-                the finest mesh: at least the local harmonic mixture of an independent program \
-                (3.6e-3, 2.8e-3, 3.0e-3, 1.6e-3), and for the weak inclusion its plain particles \
-                (9.9e-3). Published for Q1-P0 elements on SolVi, velocity: 8.5e-3 at 32 cells, \
-                3.9e-3 at 64, 2.2e-3 at 128."
+        about: "Relative velocity errors, mean over three seeds of jittered particles, 16 per \
+                cell. `laminate` (default): the interface is reconstructed from the particles; the \
+                two materials act in series for shear along it and in parallel for stretching \
+                along it; sheets and drops smaller than a cell have separate rules. `mixture`: \
+                Gauss points with the local harmonic mixture of the cell's particles. `particles`: \
+                particles as integration points (the source). Required at the finest mesh: errors \
+                no larger than with the local harmonic mixture of an independent program (3.6e-3, \
+                2.8e-3, 3.0e-3, 1.6e-3), and for the weak inclusion no larger than with its plain \
+                particles (9.9e-3). Published velocity errors of Q1-P0 elements on SolVi: 8.5e-3 \
+                at 32 cells, 3.9e-3 at 64, 2.2e-3 at 128."
             .into(),
         ..Section::default()
     };
@@ -93,14 +101,14 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
             RULES.iter().zip(last).find(|(r, _)| **r == name).map_or(f64::NAN, |v| v.1)
         };
         if let (Some(wanted), Effort::Full) = (e.wanted, effort) {
-            let what = format!("{}: velocity", e.label);
+            let what = format!("{}: velocity error", e.label);
             if e.goal {
                 out.aim(what, of(DEFAULT), Bound::AtMost(wanted));
             } else {
                 out.check(what, of(DEFAULT), Bound::AtMost(wanted));
             }
         }
-        let what = format!("{}: plain particles / ours", e.label);
+        let what = format!("{}: velocity error of plain particles relative to ours", e.label);
         let ratio = of("particles") / of(DEFAULT);
         if e.goal {
             out.aim(what, ratio, Bound::AtLeast(1.0));
@@ -115,6 +123,8 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     Ok(out)
 }
 
+/// Mean velocity error of a rule over the seeds; infinite if a rule other than the default does not
+/// converge.
 fn mean_error(case: &Case, cells: u32, rule: &str, effort: Effort) -> Result<f64, CaseError> {
     let rule = format!("accuracy.quadrature={rule}");
     let seeds = effort.take(&SEEDS);
@@ -123,7 +133,7 @@ fn mean_error(case: &Case, cells: u32, rule: &str, effort: Effort) -> Result<f64
         let seed = format!("accuracy.seed={seed}");
         match case.errors(cells, &[&rule, &seed, "accuracy.placement=jittered"]) {
             Ok(e) => sum += e.velocity,
-            // A rule that others are compared with may fail: that is a result.
+            // A failure of a rule other than the default is a result.
             Err(CaseError::Sim(SimError::Solve { .. })) if rule != DEFAULT_SET => {
                 return Ok(f64::INFINITY);
             }
@@ -133,15 +143,16 @@ fn mean_error(case: &Case, cells: u32, rule: &str, effort: Effort) -> Result<f64
     Ok(sum / seeds.len() as f64)
 }
 
+/// Dissipation of inclusions smaller than a cell.
 fn small_inclusions(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     const CELLS: u32 = 16;
     let h = 1.0 / f64::from(CELLS);
     let mut header = vec!["inclusion"];
     header.extend(RULES);
     let mut table = Table::new(
-        "Inclusions smaller than a cell, contrast 1000: share of the true excess of dissipation \
-         (16 cells a side; 1 is exact). A sheet is stretched along itself; the drop is compared \
-         with the dilute limit.",
+        "Inclusions smaller than a cell, contrast 1000: computed excess of dissipation over the \
+         exact one (16 cells per side; 1 is exact). Sheets are stretched along their length; drops \
+         are compared with the dilute limit.",
         &header,
     );
     let mut list = vec![];
@@ -171,7 +182,7 @@ fn small_inclusions(effort: Effort, out: &mut Section) -> Result<(), CaseError> 
     Ok(())
 }
 
-/// A drop that falls, its rim inside cells; its speed.
+/// Largest speed of a falling drop whose boundary lies inside cells.
 fn fall(drop: &str, around: &str, cells: u32, rule: &str) -> Result<f64, CaseError> {
     let text = format!(
         "schema = 1\nname = \"drop\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
@@ -185,12 +196,13 @@ fn fall(drop: &str, around: &str, cells: u32, rule: &str) -> Result<f64, CaseErr
     Ok(start(&source)?.row().max_speed)
 }
 
+/// Speeds of falling drops of Cosserat and layered fluid.
 fn drops(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     let mut header = vec!["drop", "viscosity around"];
     header.extend(RULES);
     let mut table = Table::new(
-        "Falling drops of Cosserat and of layered fluid in a fluid of other viscosity: largest speed \
-         at 16 cells over that at 64 cells with the default rule.",
+        "Falling drops of Cosserat and layered fluid in a fluid of different viscosity: largest \
+         speed at 16 cells over that at 64 cells with the default rule.",
         &header,
     );
     let cosserat = "coupling_viscosity = 1\ninternal_length = 0.25";
@@ -202,8 +214,8 @@ fn drops(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
             for rule in RULES {
                 let ratio = fall(drop, around, 16, rule)? / fine;
                 row.push(format!("{ratio:.3}"));
-                // A drop a thousand times softer than what is around it moves as fast as its rim
-                // lets it: converged at many more cells only.
+                // The speed of a drop that is a thousand times softer than its surroundings
+                // depends on its boundary and converges only with many more cells.
                 if rule == DEFAULT && *around != "1e3" {
                     out.check(
                         format!("{name} drop in {around}: speed at 16 cells over that at 64"),

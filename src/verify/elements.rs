@@ -1,4 +1,5 @@
-//! What the elements alone promise: third order in velocity and rotation, second in pressure.
+//! Verifies the convergence of the elements alone: third order in velocity and rotation, second
+//! order in pressure.
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number, rate};
@@ -7,18 +8,21 @@ use crate::cases::{
     poiseuille, solcx, steady_vortex_without_particles,
 };
 
+/// Numbers of cells per side.
 const CELLS: [u32; 4] = [16, 32, 64, 128];
+/// Fluid of the Cosserat cases.
 const FLUID: Fluid = Fluid { shear: 1.0, coupling: 1.0, internal_length: 0.3 };
 
+/// Verifies the convergence rates of the elements.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
         title: "The elements",
         about: "Cases in which every cell holds one uniform material and forces are fixed in \
-                space: particles play no part, and what is left is the error of Q2 velocity and \
-                rotation with discontinuous linear pressure. Relative errors in the L2 norm. \
-                SolCx has its viscosity jump of 1e6 on a mesh line; exact integration is known to \
-                reach velocity 1.3e-3, 1.7e-4, 2.1e-5, 2.6e-6 and pressure 2.9e-3, 7.3e-4, \
-                1.8e-4, 4.6e-5 there."
+                space. Particles have no effect, so the error is that of the elements: Q2 velocity \
+                and rotation, discontinuous linear pressure. Relative errors in the L2 norm. The \
+                viscosity jump of 1e6 in SolCx lies on a mesh line; there, exact integration is \
+                known to reach velocity 1.3e-3, 1.7e-4, 2.1e-5, 2.6e-6 and pressure 2.9e-3, \
+                7.3e-4, 1.8e-4, 4.6e-5."
             .into(),
         ..Section::default()
     };
@@ -59,15 +63,17 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     Ok(out)
 }
 
-/// A quantity that has an expected rate.
+/// A quantity with an expected convergence rate.
 struct Quantity {
     name: &'static str,
     rate: f64,
     of: ErrorOf,
 }
 
+/// Function that selects the error of a quantity.
 type ErrorOf = fn(&Errors) -> f64;
 
+/// Quantities of a case that have an expected rate.
 fn quantities(case: &Case) -> Vec<Quantity> {
     let rates = &case.rates;
     let all: [(_, _, ErrorOf); 3] = [
@@ -80,6 +86,7 @@ fn quantities(case: &Case) -> Vec<Quantity> {
         .collect()
 }
 
+/// Adds the errors and rates of a case to the table.
 fn tabulate(case: &Case, results: &[(u32, Errors)], table: &mut Table) {
     let known = quantities(case);
     for (k, (n, errors)) in results.iter().enumerate() {
@@ -102,7 +109,7 @@ fn tabulate(case: &Case, results: &[(u32, Errors)], table: &mut Table) {
     }
 }
 
-/// Every rate between neighbouring resolutions, unless rounding has been reached.
+/// Checks the lowest rate between neighbouring resolutions, ignoring errors at rounding level.
 fn check(case: &Case, results: &[(u32, Errors)], out: &mut Section) {
     for Quantity { name, rate: expected, of: get } in quantities(case) {
         let rates = results

@@ -1,24 +1,27 @@
-//! The layered law is the limit of a stack of thin layers.
+//! Verifies that the layered law is the limit of a resolved stack of thin layers.
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number, rate};
 use crate::cases::{CaseError, Wave, layer_stack};
 
-/// Pairs of layers, each with at least four cells to a layer in the middle of the box.
+/// Numbers of pairs of layers; each layer in the middle of the box has at least four cells.
 const PAIRS: [u32; 4] = [2, 4, 8, 16];
+/// Ratio of the viscosities of hard and soft layers.
 const CONTRAST: f64 = 10.0;
 
+/// Verifies the layered law against resolved stacks.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
         title: "Layers: a resolved stack against the layered law",
         about: format!(
-            "A box with 2 to 16 pairs of hard and soft layers (contrast {CONTRAST}), each resolved \
-             by at least four cells, is stirred; beside it the exact flow of one layered fluid \
-             whose viscosity is the arithmetic mean and whose layer viscosity is the harmonic mean \
-             of the stack's (sections 2.3-2.4 of the source). The flow with two half waves \
-             across the layers shears along them where the one with two half waves along them \
-             stretches them, and the other way round. The stack differs from its law by a share that falls with the \
-             thickness of the layers: the law is its limit."
+            "A body force drives the flow in a box with 2 to 16 pairs of hard and soft layers \
+             (contrast {CONTRAST}), each layer resolved by at least four cells. It is compared \
+             with the exact flow of a single layered fluid whose viscosity is the arithmetic mean \
+             and whose layer viscosity is the harmonic mean of those of the stack (sections \
+             2.3-2.4 of the source). Where the flow with two half waves across the layers shears \
+             along them, the flow with two half waves along the layers stretches them, and vice \
+             versa. The difference falls with the thickness of the layers: the law is the limit of \
+             the stack."
         ),
         ..Section::default()
     };
@@ -53,14 +56,14 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
             let share = last.1 / first.1;
             out.check(
                 format!(
-                    "half waves {name}: difference at {} pairs over that at {}",
+                    "half waves {name}: difference at {} pairs over difference at {}",
                     last.0, first.0
                 ),
                 share,
                 Bound::AtMost(0.8),
             );
         }
-        // Few thick layers are far from the limit.
+        // A few thick layers are far from the limit.
         if let ([.., coarse, fine], Effort::Full) = (&results[..], effort) {
             out.check(
                 format!("half waves {name}: last rate in the thickness of a layer"),

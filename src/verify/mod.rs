@@ -1,7 +1,7 @@
-//! Verification: every case with a known answer, measured, with the numbers others published
-//! beside ours.
+//! Verification: measures the errors of all cases with a known solution, and compares them with
+//! published numbers.
 //!
-//! `grainscope verify` prints and writes what [`run`] finds; the tests run the quick version of
+//! `grainscope verify` prints and writes the report of [`run`]. The tests run the quick version of
 //! the same functions.
 
 mod corners;
@@ -19,17 +19,17 @@ pub use report::{Bound, Check, Figure, Report, Section, Table, number, rate};
 
 use crate::cases::CaseError;
 
-/// How much is computed.
+/// Amount of computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// Under a minute: coarse meshes, one seed.
+    /// Takes less than a minute: coarse meshes, few seeds.
     Quick,
-    /// What `docs/verification.md` shows.
+    /// The results shown in `docs/verification.md`.
     Full,
 }
 
 impl Effort {
-    /// The resolutions of a list that this effort reaches: the coarse half of it if quick.
+    /// The elements of a list that this effort uses: the first half of it if quick.
     fn take<'a, T>(&self, all: &'a [T]) -> &'a [T] {
         match self {
             Effort::Quick => &all[..all.len().div_ceil(2)],
@@ -38,10 +38,10 @@ impl Effort {
     }
 }
 
-/// Verifies a subject.
+/// Function that verifies a subject.
 type Subject = fn(Effort) -> Result<Section, CaseError>;
 
-/// All subjects: name for the command line, and function.
+/// All subjects: name on the command line, and function.
 pub const SUBJECTS: [(&str, Subject); 9] = [
     ("elements", elements::section),
     ("smooth", smooth::section),
@@ -54,7 +54,8 @@ pub const SUBJECTS: [(&str, Subject); 9] = [
     ("texture", texture::section),
 ];
 
-/// Verifies the subjects of these names, in order.
+/// Verifies the subjects with the given names, in the order of [`SUBJECTS`]. `announce` is called
+/// with the name of each subject.
 pub fn run(
     names: &[&str],
     effort: Effort,

@@ -1,4 +1,5 @@
-//! Rayleigh-Taylor: growth rates of linear theory, and the benchmark of van Keken et al. (1997).
+//! Verifies the Rayleigh-Taylor instability: growth rates against linear theory, and the benchmark
+//! of van Keken et al. (1997).
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
@@ -6,6 +7,7 @@ use crate::cases::rayleigh_taylor::{Undulation, growth_ratio};
 use crate::cases::{CaseError, start};
 use crate::scene::presets;
 
+/// Verifies growth rates and the van Keken benchmark.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
         title: "Rayleigh-Taylor",
@@ -15,7 +17,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
                 cells. *Benchmark*: rms speed of the isoviscous box of van Keken et al. (1997), \
                 preset `rayleigh_taylor`; published peaks: 3.0916e-3 at 208.99 (HS, 81^2), \
                 3.0943e-3 at 208.5 (CND, 48^2), 3.091e-3 at 207.05 (PvK, 80^2), 3.102e-3 at 209.2 \
-                (Tackley and King, 128^2 with 40 particles a cell)."
+                (Tackley and King, 128^2 with 40 particles per cell)."
             .into(),
         ..Section::default()
     };
@@ -26,6 +28,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     Ok(out)
 }
 
+/// Growth rates for several wavelengths and viscosity ratios.
 fn growth(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     const WAVELENGTHS: [f64; 4] = [0.5, 1.0, 1.8284, 3.0];
     const CELLS: u32 = 64;
@@ -49,6 +52,7 @@ fn growth(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     Ok(())
 }
 
+/// First peak of the rms speed in the van Keken benchmark.
 fn benchmark(out: &mut Section) -> Result<(), CaseError> {
     let sets = ["accuracy.cells=64".into(), "time.end=300".into(), "recording.frames=1".into()];
     let source = presets::find("rayleigh_taylor")?.with_sets(&sets)?;
@@ -75,7 +79,7 @@ fn benchmark(out: &mut Section) -> Result<(), CaseError> {
     Ok(())
 }
 
-/// The largest value, on the parabola through it and its neighbours.
+/// Position and value of the maximum, on the parabola through the largest point and its neighbours.
 fn peak(curve: &[(f64, f64)]) -> (f64, f64) {
     let best =
         (1..curve.len().saturating_sub(1)).max_by(|&a, &b| curve[a].1.total_cmp(&curve[b].1));

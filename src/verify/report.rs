@@ -1,68 +1,88 @@
-//! What verification finds: tables, figures and checks with their bounds.
+//! The verification report: tables, figures, and checks with their bounds.
 
 use serde::Serialize;
 
-/// All that was verified.
+/// Report of all verified subjects.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
+    /// One section per subject.
     pub sections: Vec<Section>,
 }
 
-/// One subject.
+/// Section of one subject.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Section {
+    /// Heading.
     pub title: &'static str,
-    /// What is computed and what it shows; Markdown.
+    /// Description of the computation and its result, Markdown.
     pub about: String,
+    /// Tables of results.
     pub tables: Vec<Table>,
+    /// Figures of results.
     pub figures: Vec<Figure>,
+    /// Checks of results.
     pub checks: Vec<Check>,
 }
 
-/// Cells of text under a header.
+/// A table of text cells with a header.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Table {
+    /// Line above the table; may be empty.
     pub title: String,
+    /// Names of the columns.
     pub header: Vec<String>,
+    /// Rows of cells, each as long as the header.
     pub rows: Vec<Vec<String>>,
 }
 
-/// Curves over one axis; logarithmic ones show powers as straight lines.
+/// A plot of curves.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figure {
-    /// Name of its file, without extension.
+    /// File name without extension.
     pub name: String,
+    /// Title of the plot.
     pub title: String,
+    /// Label of the x axis.
     pub x: &'static str,
+    /// Label of the y axis.
     pub y: &'static str,
+    /// True if both axes are logarithmic, so that powers are straight lines.
     pub logarithmic: bool,
+    /// Names and points `(x, y)` of the curves.
     pub curves: Vec<(String, Vec<(f64, f64)>)>,
 }
 
-/// A number and what it has to be.
+/// A measured number and its required bound.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
+    /// Description of the number.
     pub what: String,
+    /// Measured value.
     pub value: f64,
+    /// Required bound.
     pub bound: Bound,
+    /// True if the value satisfies the bound.
     pub passed: bool,
-    /// A goal: to miss it is a known shortfall, not a failure.
+    /// True for a goal: missing it is a known shortfall, not a failure.
     pub goal: bool,
 }
 
-/// What a number has to be.
+/// Required bound of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
+    /// The number must not exceed this value.
     AtMost(f64),
+    /// The number must not be below this value.
     AtLeast(f64),
-    /// Not farther than the second from the first.
+    /// The number must differ from the first value by at most the second.
     Within(f64, f64),
 }
 
 impl Check {
+    /// A check of a value against a bound; not a goal.
     pub fn new(what: impl Into<String>, value: f64, bound: Bound) -> Self {
-        // Not-a-number passes nothing.
+        // NaN fails every bound.
         let passed = match bound {
             Bound::AtMost(most) => value <= most,
             Bound::AtLeast(least) => value >= least,
@@ -71,7 +91,7 @@ impl Check {
         Check { what: what.into(), value, bound, passed, goal: false }
     }
 
-    /// What the table says of it.
+    /// Text of the result in the table.
     pub fn verdict(&self) -> &'static str {
         match (self.passed, self.goal) {
             (true, _) => "pass",
@@ -92,11 +112,13 @@ impl std::fmt::Display for Bound {
 }
 
 impl Table {
+    /// A table without rows.
     pub fn new(title: impl Into<String>, header: &[&str]) -> Self {
         let header = header.iter().map(ToString::to_string).collect();
         Table { title: title.into(), header, rows: vec![] }
     }
 
+    /// The table as Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let mut out = String::new();
@@ -111,16 +133,17 @@ impl Table {
 }
 
 impl Section {
+    /// Adds a check that must pass.
     pub fn check(&mut self, what: impl Into<String>, value: f64, bound: Bound) {
         self.checks.push(Check::new(what, value, bound));
     }
 
-    /// A bound that is aimed at and may be missed.
+    /// Adds a goal: a check that may fail.
     pub fn aim(&mut self, what: impl Into<String>, value: f64, bound: Bound) {
         self.checks.push(Check { goal: true, ..Check::new(what, value, bound) });
     }
 
-    /// The section as Markdown; figures are looked for in `folder`.
+    /// The section as Markdown, with links to figures in `folder`.
     pub fn markdown(&self, folder: &str) -> String {
         let mut out = format!("## {}\n\n{}\n", self.title, self.about.trim());
         for table in &self.tables {
@@ -146,10 +169,12 @@ impl Section {
 }
 
 impl Report {
+    /// Checks that failed, without goals.
     pub fn failures(&self) -> impl Iterator<Item = &Check> {
         self.sections.iter().flat_map(|s| &s.checks).filter(|c| !c.passed && !c.goal)
     }
 
+    /// Number of checks, goals included.
     pub fn checks(&self) -> usize {
         self.sections.iter().map(|s| s.checks.len()).sum()
     }
@@ -163,7 +188,7 @@ pub fn number(v: f64) -> String {
     let size = v.abs();
     if !(1e-2..1e4).contains(&size) {
         let text = format!("{v:.2e}");
-        // Whole powers of ten, and halves, read better without zeros.
+        // Trailing zeros are removed.
         let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
         let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
         return format!("{mantissa}e{exponent}");
@@ -177,7 +202,8 @@ pub fn number(v: f64) -> String {
     }
 }
 
-/// `log2` of the ratio of errors over that of resolutions.
+/// Convergence rate between two pairs of resolution and error: `log2` of the ratio of the errors
+/// over `log2` of the ratio of the resolutions.
 pub fn rate(coarse: (u32, f64), fine: (u32, f64)) -> f64 {
     (coarse.1 / fine.1).log2() / (f64::from(fine.0) / f64::from(coarse.0)).log2()
 }
@@ -203,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn not_a_number_passes_nothing() {
+    fn nan_fails_every_bound() {
         for bound in [Bound::AtMost(1.0), Bound::AtLeast(1.0), Bound::Within(1.0, 1.0)] {
             assert!(!Check::new("", f64::NAN, bound).passed);
         }

@@ -1,23 +1,27 @@
-//! Heavy over light at rest, and disturbed levels at large steps.
+//! Verifies that stratified fluids stay at rest, and that disturbed levels relax at large time
+//! steps.
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
 use crate::cases::{CaseError, start};
 use crate::scene::{SceneSource, presets};
 
+/// Values of `accuracy.placement`.
 const PLACEMENTS: [&str; 3] = ["regular", "jittered", "random"];
 
+/// Verifies fluids at rest and their relaxation.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
-        title: "Rest, and the way to it",
-        about: "*At rest*: largest speed after a step, over rho g a^2/eta of the heavy fluid, in a \
-                closed box (`hydrostatic`, viscosity contrast 1000) with the level inside a cell, \
-                and for a density that falls off smoothly. Gravity oblique to the mesh bends the \
-                pressure in a way that its element cannot follow; that speed must fall at second \
-                order. The leading particle-in-cell code is left with about 1e-5 of its flow's speed when \
-                converged tightly, 4e-3 at its defaults. *Large steps*: a cosine of the level \
-                relaxes; tau is its relaxation time. Restoring loads are taken ahead of the step \
-                (`accuracy.stabilisation`; Kaus et al. 2010)."
+        title: "Fluids at rest, and relaxation",
+        about: "*At rest*: largest speed after a step, over rho g a^2/eta of the heavy fluid, in \
+                a closed box (`hydrostatic`, viscosity contrast 1000) with the level inside a \
+                cell, and for a density that decreases smoothly. If gravity is oblique to the \
+                mesh, the pressure element cannot represent the hydrostatic pressure exactly; this \
+                speed must fall at second order. The leading particle-in-cell code retains about \
+                1e-5 of its flow speed when converged tightly, and 4e-3 at its defaults. *Large \
+                steps*: a cosine-shaped level relaxes; tau is its relaxation time. Restoring loads \
+                include part of their change over the next step (`accuracy.stabilisation`; Kaus et \
+                al. 2010)."
             .into(),
         ..Section::default()
     };
@@ -27,6 +31,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     Ok(out)
 }
 
+/// Speeds of fluids at rest for several placements.
 fn at_rest(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     let mut table = Table::new("At rest", &["scene", "cells", "regular", "jittered", "random"]);
     let mut worst: f64 = 0.0;
@@ -64,6 +69,7 @@ fn at_rest(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     Ok(())
 }
 
+/// A unit box at rest; `rest` holds its materials and regions.
 fn resting(gravity: &str, cells: u32, placement: &str, rest: &str) -> SceneSource {
     let text = format!(
         "schema = 1\nname = \"rest\"\ngravity = {gravity}\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
@@ -72,6 +78,7 @@ fn resting(gravity: &str, cells: u32, placement: &str, rest: &str) -> SceneSourc
     SceneSource::new("rest", text)
 }
 
+/// Speeds at rest under gravity oblique to the mesh, and their order.
 fn oblique(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     let level = "[materials.a]\ndensity = 1000\nshear_viscosity = 100\n\
                  [materials.b]\nshear_viscosity = 100\nbackground = true\n\
@@ -104,6 +111,7 @@ fn oblique(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     Ok(())
 }
 
+/// Relaxation of a disturbed level with and without stabilisation.
 fn relaxation(out: &mut Section) -> Result<(), CaseError> {
     const AMPLITUDE: f64 = 0.1;
     let text = format!(
@@ -114,12 +122,12 @@ fn relaxation(out: &mut Section) -> Result<(), CaseError> {
          material = \"heavy\"\nshape.where = \"y < 0.5 + {AMPLITUDE}*cos(pi*x)\"\n"
     );
     let mut table = Table::new(
-        "A level relaxes in 30 steps that only Courant 0.5 limits",
+        "Relaxation of a level in 30 steps limited only by a Courant number of 0.5",
         &["stabilisation", "longest step / tau", "speed of the last 10 steps / first"],
     );
     let mut figure = Figure {
         name: "sloshing".into(),
-        title: "A disturbed level, steps limited by the Courant number only".into(),
+        title: "Relaxation of a disturbed level, steps limited only by the Courant number".into(),
         x: "step",
         y: "largest speed / first",
         logarithmic: false,
@@ -145,7 +153,7 @@ fn relaxation(out: &mut Section) -> Result<(), CaseError> {
         figure.curves.push((format!("stabilisation {name}"), curve));
         if value > 0.0 {
             out.check("stabilised: longest step / tau", longest, Bound::AtLeast(30.0));
-            out.check("stabilised: late speed / first", late, Bound::AtMost(0.05));
+            out.check("stabilised: speed of the last 10 steps / first", late, Bound::AtMost(0.05));
         }
     }
     out.tables.push(table);

@@ -1,4 +1,4 @@
-//! Smooth material carried by particles keeps the accuracy of the elements.
+//! Verifies that smooth material properties on particles keep the accuracy of the elements.
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
@@ -6,21 +6,24 @@ use crate::cases::{
     CaseError, Drive, SolCx, solcx, solkz, steady_vortex, steady_vortex_without_particles,
 };
 
+/// Numbers of cells per side.
 const CELLS: [u32; 4] = [16, 32, 64, 128];
+/// Assignment that places particles at random.
 const RANDOM: &str = "accuracy.placement=random";
 
+/// Verifies smooth material properties carried by particles.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
         title: "Smooth material on particles",
-        about: "Viscosity (SolKz: from 1 to 1e6 over the box) and density are known to 16 \
-                particles per cell at random places only. *Without particles*: the same scene \
-                with its fields known at the Gauss points. *Plain*: the particles as integration \
-                points, the method of the source. The steady vortex (rigid shear of Gassmoeller \
-                et al. 2019) is measured after its particles have moved for 0.1 s, a \
-                twentieth of a turn at least; its particle-free error is that of the elements \
-                with the force fixed in space. With particles as the only integration points \
-                the leading particle-in-cell code reaches 1.3e-3, 4.5e-4, 2.6e-4 in velocity and \
-                3.5e-2, 2.9e-2, 2.1e-2 in pressure on SolCx at 32, 64, 128 cells."
+        about: "Viscosity (SolKz: from 1 to 1e6 over the box) and density are known only at 16 \
+                randomly placed particles per cell. *Without particles*: the same scene with its \
+                fields evaluated at the Gauss points. *Plain*: particles as integration points, \
+                the method of the source. The steady vortex (rigid shear of Gassmoeller et al. \
+                2019) is measured after its particles have moved for 0.1 s, at least a twentieth \
+                of a turn; its error without particles is that of the elements with the force \
+                fixed in space. With particles as the only integration points the leading \
+                particle-in-cell code reaches 1.3e-3, 4.5e-4, 2.6e-4 in velocity and 3.5e-2, \
+                2.9e-2, 2.1e-2 in pressure on SolCx at 32, 64, 128 cells."
             .into(),
         ..Section::default()
     };
@@ -76,7 +79,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
                 curve.push((f64::from(n), e.velocity));
             }
             out.check(
-                format!("{} at {n}: plain particles / ours, velocity", case.name),
+                format!("{} at {n}: velocity error of plain particles relative to ours", case.name),
                 plain.velocity / ours.velocity,
                 Bound::AtLeast(1.0),
             );
@@ -86,7 +89,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         }
         for (name, worst) in ["velocity", "pressure"].iter().zip(worst) {
             out.check(
-                format!("{}: largest {name} error over the particle-free one", case.name),
+                format!("{}: largest {name} error relative to that without particles", case.name),
                 worst,
                 Bound::AtMost(1.5),
             );
@@ -109,7 +112,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
             String::new(),
         ]);
         out.check(
-            format!("steady vortex at {n}: velocity error over the particle-free one"),
+            format!("steady vortex at {n}: velocity error relative to that without particles"),
             ours.velocity / exact.velocity,
             Bound::AtMost(2.0),
         );

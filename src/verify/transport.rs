@@ -1,26 +1,28 @@
-//! Particles over long runs: do they stay spread, and does volume stay put?
+//! Verifies that particles stay evenly distributed in long runs and that their volume is conserved.
 
 use super::Effort;
 use super::report::{Bound, Section, Table, number};
 use crate::cases::{CaseError, start};
 use crate::scene::SceneSource;
 
-/// A box whose lid moves: the corners of a lid are where particles crowd and thin out most.
+/// A box with a moving lid. At the corners of the lid particles accumulate and thin out most.
 const LID: &str = "schema = 1\nname = \"lid\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\n\
                    cells = 16\n[time]\nend = 1e9\n[recording]\nframes = 0\n[materials.fluid]\n\
                    shear_viscosity = 1\n[[regions]]\nmaterial = \"fluid\"\n[boundaries]\n\
                    left.kind = \"no_slip\"\nright.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
                    top = { velocity_x = \"16*x^2*(1-x)^2\", velocity_y = 0 }\n";
 
+/// Verifies the distribution of particles in a long run.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let steps: u64 = if effort == Effort::Full { 10_000 } else { 500 };
     let mut out = Section {
         title: "Transport over long runs",
-        about: "A steady vortex under a moving lid, 16 x 16 cells, Courant 0.5. Particles move in \
-                the velocity corrected to be free of divergence inside cells (`motion/current.rs`; \
-                without the correction the volumes of cells' particles differ from the cells' by \
-                4 rms after 10,000 steps when nothing evens them out, with it by 0.24). Orders \
-                in time of particles, directors and dye: physics tests `order`."
+        about: "A steady vortex under a moving lid, 16 x 16 cells, Courant number 0.5. Particles \
+                move with a velocity corrected to be divergence-free inside cells \
+                (`motion/current.rs`). Without particle redistribution, the rms difference between \
+                the particle volume in a cell and the cell volume after 10,000 steps is 4 without \
+                the correction and 0.24 with it. The orders in time of particles, directors and \
+                dye are tested in the physics tests `order`."
             .into(),
         ..Section::default()
     };

@@ -1,4 +1,4 @@
-//! Commands that run nothing.
+//! Tests of commands that do not run a simulation.
 
 use super::*;
 
@@ -94,7 +94,7 @@ fn the_schema_is_json_and_names_every_key_of_the_presets() {
 }
 
 #[test]
-fn completions_and_manual_know_the_commands() {
+fn completions_and_manual_list_the_commands() {
     let here = TempFolder::new();
     let commands = ["run", "plan", "check", "presets", "schema"];
     let bash = here.grainscope(&["completions", "bash"]).exits(0);
@@ -104,7 +104,7 @@ fn completions_and_manual_know_the_commands() {
 }
 
 #[test]
-fn help_tells_the_exit_codes() {
+fn help_lists_the_exit_codes() {
     let here = TempFolder::new();
     let help = here.grainscope(&["--help"]).exits(0);
     help.prints(&["Examples:", "Exit codes:", "130  interrupted"]);
@@ -133,7 +133,7 @@ fn usage_errors_exit_with_2() {
 }
 
 #[test]
-fn a_reader_that_stops_listening_is_no_fault() {
+fn a_closed_output_pipe_is_not_an_error() {
     let here = TempFolder::new();
     let mut child = here
         .command(&["schema"])

@@ -1,4 +1,4 @@
-//! Runs are compared: what is told, what is written, and what decides in CI.
+//! Tests of comparisons: printed results, written files, and tolerances for CI.
 
 use super::*;
 use rerun::external::re_chunk_store::ChunkStore;
@@ -21,7 +21,7 @@ fn short_run(here: &TempFolder, out: &str, more: &[&str]) {
     here.grainscope(&arguments).exits(0);
 }
 
-/// Two runs: `a`, and `b` with what is given.
+/// Two runs: `a`, and `b` with additional arguments.
 fn two(more: &[&str]) -> TempFolder {
     let here = TempFolder::new();
     short_run(&here, "a", &[]);
@@ -58,7 +58,7 @@ fn the_same_scene_run_twice_is_identical() {
 }
 
 #[test]
-fn tolerances_decide_and_the_first_difference_is_named() {
+fn tolerances_are_checked_and_differences_are_named() {
     let here = two(&["--set", "alpha=5/3"]);
     let near = ["a", "b", "--no-output", "--tolerance", "outflow_volume=50%"];
     compare(&here, &near).exits(0).prints(&["within", "parameters.alpha.value", "1/3", "5/3"]);
@@ -90,14 +90,14 @@ fn the_recording_holds_all_runs_under_their_names() {
     ] {
         assert!(entities.iter().any(|e| e == entity), "{entity} is missing in {entities:#?}");
     }
-    // alpha = 0 solves no rotation: what both have is subtracted.
+    // With alpha = 0 there is no rotation; fields that both runs have are subtracted.
     let differences: BTreeSet<&str> = entities
         .iter()
         .filter(|e| e.starts_with("/differences/") && e.ends_with("/image"))
         .filter_map(|e| e.rsplit('/').nth(1))
         .collect();
     assert_eq!(differences, BTreeSet::from(["pressure", "speed"]));
-    // The cursor moves all of them, in time and as a race.
+    // The time cursor moves all runs, by simulation time and by wall-clock time.
     let first = recording::steps(&recording::recording(&here.path("a/recording.rrd")));
     assert!(first.iter().all(|step| recording::steps(&store).contains(step)));
     let wall = rerun::external::re_log_types::TimelineName::from("wall_time");
@@ -107,11 +107,11 @@ fn the_recording_holds_all_runs_under_their_names() {
             assert!(here.has(&format!("out/both_{plot}.{suffix}")), "{plot}.{suffix}");
         }
     }
-    assert!(here.read("out/both_outflow.svg").contains("volume that has flowed out"));
+    assert!(here.read("out/both_outflow.svg").contains("outflow volume"));
 }
 
 #[test]
-fn other_resolutions_and_ends_compare_where_they_can() {
+fn runs_of_other_resolution_and_end_time_can_be_compared() {
     let here = two(&["--set", "accuracy.cells=3", "--set", "time.end=8e-5"]);
     let said = compare(&here, &["a", "b", "--json", "--no-output"]).exits(0);
     let json = said.json();
@@ -129,7 +129,7 @@ fn other_resolutions_and_ends_compare_where_they_can() {
 }
 
 #[test]
-fn a_recording_alone_is_a_run() {
+fn a_recording_without_its_folder_can_be_compared() {
     let here = two(&["--set", "alpha=5/3"]);
     std::fs::copy(here.path("b/recording.rrd"), here.path("lone.rrd")).expect("a copy");
     let lone = compare(&here, &["a", "lone.rrd", "--json", "--no-output"]).exits(0).json();
@@ -148,23 +148,23 @@ fn a_recording_alone_is_a_run() {
 }
 
 #[test]
-fn a_golden_summary_decides_in_ci() {
+fn a_stored_summary_can_be_used_in_ci() {
     let here = two(&[]);
     std::fs::copy(here.path("a/summary.json"), here.path("golden.json")).expect("a copy");
     let check = ["golden.json", "b", "--tolerance", "outflow_volume=1%"];
     compare(&here, &check).exits(0).prints(&["b is identical to golden", "within"]);
-    assert!(!here.has("comparisons"), "one run has nothing beside it");
+    assert!(!here.has("comparisons"), "a single run needs no comparison folder");
     short_run(&here, "c", &["--set", "alpha=5/3"]);
     let check = ["golden.json", "c", "--tolerance", "outflow_volume=1%"];
     compare(&here, &check).exits(6).complains(&["outflow_volume of c", "of golden", "1 %"]);
-    // A run that stops too early cannot be judged: that is outside.
+    // A run that stops too early cannot be compared and is outside the tolerance.
     short_run(&here, "d", &["--steps", "1"]);
     let check = ["golden.json", "d", "--tolerance", "outflow_volume=1%"];
     compare(&here, &check).exits(6).complains(&["cannot be compared", "did not finish"]);
 }
 
 #[test]
-fn what_cannot_be_compared_is_told() {
+fn runs_that_cannot_be_compared_are_refused() {
     let here = TempFolder::new();
     short_run(&here, "a", &[]);
     here.write("empty.rrd", "");
@@ -179,10 +179,10 @@ fn what_cannot_be_compared_is_told() {
         (vec!["a", "./a/summary.json"], 2, vec!["the same run"]),
         (vec!["a", "nowhere"], 1, vec!["nowhere", "no such file or folder"]),
         (vec!["a", "folder"], 1, vec!["folder: holds no run", "series.csv"]),
-        (vec!["a", "empty.rrd"], 1, vec!["empty.rrd", "no recording"]),
-        (vec!["a", "text.rrd"], 1, vec!["text.rrd", "no recording"]),
-        (vec!["a", "head.rrd"], 1, vec!["head.rrd", "no recording"]),
-        (vec!["a", "list.json"], 1, vec!["list.json", "no summary"]),
+        (vec!["a", "empty.rrd"], 1, vec!["empty.rrd", "not a readable recording"]),
+        (vec!["a", "text.rrd"], 1, vec!["text.rrd", "not a readable recording"]),
+        (vec!["a", "head.rrd"], 1, vec!["head.rrd", "not a readable recording"]),
+        (vec!["a", "list.json"], 1, vec!["list.json", "not the summary"]),
         (vec!["a", "notes.txt"], 1, vec!["notes.txt", ".rrd"]),
     ] {
         compare(&here, &runs).exits(code).complains(&parts);
@@ -191,18 +191,18 @@ fn what_cannot_be_compared_is_told() {
     let unknown = ["a", "b", "--tolerance", "outflow_volum=1%"];
     compare(&here, &unknown).exits(2).complains(&["did you mean outflow_volume?", "max_speed"]);
     let wrong = ["a", "b", "--tolerance", "outflow_volume=little"];
-    compare(&here, &wrong).exits(2).complains(&["no number", "KEY=1%"]);
+    compare(&here, &wrong).exits(2).complains(&["not a number", "KEY=1%"]);
     compare(&here, &["a", "b", "-o", "both.rrd"]).exits(0);
     compare(&here, &["a", "both.rrd"]).exits(1).complains(&["2 runs side by side"]);
 }
 
 #[test]
-fn a_cut_recording_gives_what_precedes_the_cut() {
+fn a_truncated_recording_is_compared_up_to_its_end() {
     let here = two(&[]);
     let whole = std::fs::read(here.path("b/recording.rrd")).expect("the recording");
     here.write("cut.rrd", &whole[..whole.len() * 3 / 4]);
     compare(&here, &["a", "cut.rrd", "-o", "both.rrd"]).exits(0).complains(&["is cut"]);
-    // In a folder the numbers are elsewhere.
+    // In a run folder the numbers are read from the table.
     here.write("b/recording.rrd", &whole[..whole.len() / 2]);
     compare(&here, &["a", "b", "--tolerance", "outflow_volume=0%"]).exits(0);
 }
@@ -215,7 +215,7 @@ fn figures_are_made_by_one_command() {
         assert!(here.has(&format!("fig/{file}")), "{file}");
     }
     assert!(here.read("fig/alignment_isovalues.svg").contains("t = 0.15 s"));
-    // The runs are the user's: they are not overwritten.
+    // Existing runs are not overwritten.
     here.grainscope(&["figure", "alignment", "--quick", "--out", "fig"])
         .exits(1)
         .complains(&["--force"]);
@@ -229,7 +229,7 @@ fn figures_are_made_by_one_command() {
             .as_f64()
             .expect("a volume")
     };
-    // Slower for a larger internal length.
+    // The discharge is slower for a larger internal length.
     let [zero, third, two_thirds, five_thirds] = ["0", "1_3", "2_3", "5_3"].map(volume);
     assert!(zero > third && third > two_thirds && two_thirds > five_thirds);
     let entities = entities(&recording::recording(&here.path("silo/silo.rrd")));
@@ -242,7 +242,7 @@ fn figures_are_made_by_one_command() {
     assert!(runs.len() >= 5, "{runs:?}");
 }
 
-/// Blocks of shell commands of a page.
+/// Blocks of shell commands in a page.
 fn recipes(page: &str) -> Vec<String> {
     let blocks = page.split("```sh\n").skip(1);
     blocks.filter_map(|rest| Some(rest.split_once("```")?.0.to_owned())).collect()
@@ -268,7 +268,7 @@ fn the_recipe_for_ci_works_as_it_is_written() {
     shell(&recipes[1]).exits(0);
     assert!(here.has("silo.rrd"));
     assert_eq!(here.json("comparison.json")["runs"][1]["identical"], true);
-    // Something has changed.
+    // A changed scene is detected.
     let changed = recipes[1].replace("run silo", "run silo --force --set alpha=5/3");
     shell(&changed).exits(6).complains(&["outflow_volume of ci", "of silo", "1 %"]);
     assert_eq!(here.json("comparison.json")["tolerances"][0]["within"], false);

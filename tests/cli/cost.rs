@@ -1,8 +1,8 @@
-//! `cost`, and runs that buy from its lists.
+//! Tests of `grainscope cost`, and of runs that use its tables.
 
 use super::*;
 
-/// A scene of a fraction of a second: two fluids turn over in a small box.
+/// A scene that takes a fraction of a second: two fluids overturn in a small box.
 const TINY: &str = "schema = 1\nname = \"tiny\"\ngravity = [0, -1]\n\
     [domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\ncells = 4\nparticles_per_cell = 9\n\
     [time]\nend = 4\nmax_step = 1\n\
@@ -12,7 +12,7 @@ const TINY: &str = "schema = 1\nname = \"tiny\"\ngravity = [0, -1]\n\
     shape.where = \"y < 0.4 + 0.1 * cos(pi * x)\"\n\
     [interest]\nquantity = \"rms_speed\"\n[recording]\nframes = 2\n";
 
-/// The program with a cache of its own.
+/// Runs the program with a separate cache folder.
 fn grainscope(here: &TempFolder, arguments: &[&str]) -> Said {
     let mut command = here.command(arguments);
     command.env("XDG_CACHE_HOME", here.path("cache"));
@@ -20,7 +20,7 @@ fn grainscope(here: &TempFolder, arguments: &[&str]) -> Said {
 }
 
 #[test]
-fn a_price_list_is_made_kept_and_bought_from() {
+fn a_cost_table_is_made_stored_and_used() {
     let here = TempFolder::new();
     here.write("tiny.toml", TINY);
     let said = grainscope(&here, &["cost", "tiny.toml", "--quick", "--out", "list"]).exits(0);
@@ -41,18 +41,18 @@ fn a_price_list_is_made_kept_and_bought_from() {
     let promised: Vec<f64> = front.iter().filter_map(|e| e["promised"].as_f64()).collect();
     assert!(promised.windows(2).all(|w| w[1] < w[0]), "{promised:?}");
 
-    // The list is kept: asked again it is the same, to the last digit.
+    // The table is stored: a second call prints exactly the same.
     let again = ["cost", "tiny.toml", "--quick", "--json", "--no-recording", "--out", "again"];
     let again = grainscope(&here, &again).exits(0).complains(&["kept from before"]);
     assert_eq!(again.json(), list);
     assert!(!here.has("again/race.rrd"));
 
-    // The cheapest that will do.
+    // The fastest settings of the required accuracy.
     let loose = format!("{}", promised[0] * 1.01);
     let run = ["run", "tiny.toml", "--accuracy", &loose, "--no-recording", "--out", "bought"];
     grainscope(&here, &run)
         .exits(0)
-        .complains(&["bought:", "expects rms speed at the end within"])
+        .complains(&["chosen settings:", "expects rms speed at the end within"])
         .prints(&["expected", "took"]);
     let summary = here.json("bought/summary.json");
     assert_eq!(summary["purchase"]["sets"], front[0]["sets"]);
@@ -64,13 +64,13 @@ fn a_price_list_is_made_kept_and_bought_from() {
         }
     }
 
-    // The most accurate within the time.
+    // The most accurate settings within the time.
     let run = ["run", "tiny.toml", "--budget", "1h", "--no-recording", "--out", "rich"];
     grainscope(&here, &run).exits(0);
     let best = front.last().expect("a front");
     assert_eq!(here.json("rich/summary.json")["purchase"]["sets"], best["sets"]);
 
-    // Out of reach.
+    // Accuracies and times that cannot be reached.
     grainscope(&here, &["run", "tiny.toml", "--accuracy", "1e-9"])
         .exits(2)
         .complains(&["out of reach", "the best is"]);
@@ -81,7 +81,7 @@ fn a_price_list_is_made_kept_and_bought_from() {
 }
 
 #[test]
-fn exact_solutions_are_used_where_there_are_any() {
+fn exact_solutions_are_used_if_they_exist() {
     let here = TempFolder::new();
     let sets = ["--set", "accuracy.cells=8", "--no-recording", "--out", "list", "--write", "docs"];
     let said = grainscope(&here, &[&["cost", "solcx", "--quick"], &sets[..]].concat()).exits(0);
@@ -95,7 +95,7 @@ fn exact_solutions_are_used_where_there_are_any() {
 }
 
 #[test]
-fn the_page_knows_every_preset_and_every_knob() {
+fn the_page_lists_every_preset_and_every_knob() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/cost.md");
     let page = std::fs::read_to_string(path).expect("docs/cost.md");
     for (name, _) in preset_files() {
@@ -107,7 +107,7 @@ fn the_page_knows_every_preset_and_every_knob() {
 }
 
 #[test]
-fn wishes_that_contradict_are_refused() {
+fn contradicting_options_are_refused() {
     let here = TempFolder::new();
     for (arguments, complaint) in [
         (&["--accuracy", "1%", "--budget", "3s"] as &[_], "cannot be used with"),
@@ -120,7 +120,7 @@ fn wishes_that_contradict_are_refused() {
 }
 
 #[test]
-fn an_interest_in_what_is_not_there_is_refused() {
+fn an_interest_in_a_missing_quantity_is_refused() {
     let here = TempFolder::new();
     here.grainscope(&["check", "hydrostatic", "--set", "interest.quantity=alignment"])
         .exits(3)

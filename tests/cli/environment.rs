@@ -1,4 +1,4 @@
-//! Disks, folders, rights, pipes, viewers and ports that fail, each tried for real.
+//! Tests with real failures of disks, folders, permissions, pipes, viewers and ports.
 
 use super::*;
 use std::io::{Read, Write};
@@ -6,9 +6,10 @@ use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
+/// Longest time to wait for anything.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A silo of some seconds.
+/// A run of the silo that takes some seconds; the output folder follows.
 const RUN: [&str; 9] = [
     "run",
     "silo",
@@ -30,6 +31,7 @@ fn is_root() -> bool {
     said.is_ok_and(|o| o.stdout.starts_with(b"0"))
 }
 
+/// True if a program can be run and succeeds.
 fn works(program: &str, arguments: &[&str]) -> bool {
     Command::new(program).args(arguments).stderr(Stdio::null()).status().is_ok_and(|s| s.success())
 }
@@ -47,11 +49,11 @@ fn wait_for_rows(here: &TempFolder, out: &str, rows: usize) {
     }
 }
 
-/// A small disk, unmounted when this is dropped.
+/// A small file system, unmounted when dropped.
 struct Disk(PathBuf);
 
 impl Disk {
-    /// Needs rights that not everybody has.
+    /// Mounts a file system; `None` without the rights to do so.
     fn mount(path: PathBuf, size: &str) -> Option<Disk> {
         std::fs::create_dir(&path).expect("a folder");
         let target = path.to_string_lossy().into_owned();
@@ -84,12 +86,12 @@ fn a_full_disk_is_named_and_the_run_goes_on_when_there_is_room() {
     let run = arguments("disk/run", &["--checkpoint-every", "2"]);
     let said = here.grainscope(&run).exits(1);
     said.complains(&["No space left on device", "disk/run"]);
-    // What is there is whole.
+    // Existing rows are complete.
     let rows = Table::read(&here.read("disk/run/series.csv")).rows.len();
     assert!(rows > 2, "{rows}");
     disk.resize("100m");
     let said = here.grainscope(&["resume", "disk/run"]).exits(0);
-    said.complains(&["going on after step"]);
+    said.complains(&["continuing after step"]);
     let hash = |run: &str| here.json(&format!("{run}/summary.json"))["state_hash"].clone();
     assert_eq!(hash("disk/run"), hash("whole"));
     let table = |run: &str| Table::read(&here.read(&format!("{run}/series.csv")));
@@ -100,27 +102,27 @@ fn a_full_disk_is_named_and_the_run_goes_on_when_there_is_room() {
 }
 
 #[test]
-fn a_folder_that_is_gone_is_named() {
+fn a_deleted_output_folder_is_named() {
     let here = TempFolder::new();
     let run = arguments("gone", &["--checkpoint-every", "2"]);
     let child = here.start(&run);
     wait_for_rows(&here, "gone", 2);
-    // Files may be made in it meanwhile.
+    // Repeated, because the program may create files in the folder meanwhile.
     let clock = Instant::now();
     while std::fs::remove_dir_all(here.path("gone")).is_err() && here.has("gone") {
         assert!(clock.elapsed() < PATIENCE);
     }
     let said = Said::new(&run, child.wait_with_output().expect("an end")).exits(1);
     said.complains(&["gone/", "No such file or directory"]);
-    assert!(!here.has("gone"), "it is not made again");
+    assert!(!here.has("gone"), "the folder was created again");
 }
 
 #[test]
-fn rights_that_lack_are_named() {
+fn missing_permissions_are_named() {
     let user = ["--reuid=65534", "--regid=65534", "--clear-groups"];
     let program = env!("CARGO_BIN_EXE_grainscope");
     if !is_root() || !works("setpriv", &[&user[..], &[program, "--version"]].concat()) {
-        eprintln!("skipped: no other user can be (needs root and setpriv)");
+        eprintln!("skipped: cannot change the user (needs root and setpriv)");
         return;
     }
     let here = TempFolder::new();
@@ -139,14 +141,14 @@ fn rights_that_lack_are_named() {
 }
 
 #[test]
-fn nobody_who_listens_is_no_fault() {
+fn closed_output_pipes_are_not_an_error() {
     let here = TempFolder::new();
-    // Both ends of both pipes are closed before anything is said.
+    // Both pipes are closed before anything is printed.
     let mut child = here.start(&arguments("run", &["--steps", "2"]));
     drop((child.stdout.take(), child.stderr.take()));
     assert_eq!(child.wait().expect("an end").code(), Some(0));
     assert_eq!(here.json("run/summary.json")["steps"], 2);
-    // Nor does a fault become another one.
+    // An error keeps its exit code.
     let mut child = here
         .command(&["run", "nonsense"])
         .stderr(Stdio::piped())
@@ -156,7 +158,7 @@ fn nobody_who_listens_is_no_fault() {
     assert_eq!(child.wait().expect("an end").code(), Some(3));
 }
 
-/// A viewer's server: the page of a run that is over.
+/// A server of the viewer: the page of a finished run.
 struct Viewer {
     program: Child,
     port: u16,
@@ -196,7 +198,8 @@ fn address(port: u16) -> String {
     format!("rerun+http://127.0.0.1:{port}/proxy")
 }
 
-/// A line to a viewer that carries so many bytes a second, and no more than some in all; its port.
+/// A proxy to a viewer that passes on `rate` bytes per second, and at most `most` bytes in total.
+/// Returns its port.
 fn slow_line(viewer: &Viewer, rate: f64, most: usize) -> u16 {
     let pass = |mut from: TcpStream, mut to: TcpStream, rate: f64, most: usize| {
         std::thread::spawn(move || {
@@ -209,7 +212,7 @@ fn slow_line(viewer: &Viewer, rate: f64, most: usize) -> u16 {
                     return;
                 }
             }
-            // Stays open, and takes nothing more.
+            // The connection stays open, but nothing more is read.
             std::thread::sleep(PATIENCE);
         });
     };
@@ -227,7 +230,7 @@ fn slow_line(viewer: &Viewer, rate: f64, most: usize) -> u16 {
     port
 }
 
-/// The recording of a run has a row for every step of its table.
+/// Checks that the recording of a run contains every step of its table.
 fn recorded_whole(here: &TempFolder, run: &str) {
     let rows = Table::read(&here.read(&format!("{run}/series.csv"))).rows.len();
     let store = recording::recording(&here.path(&format!("{run}/recording.rrd")));
@@ -240,13 +243,13 @@ fn a_viewer_that_dies_or_sticks_does_not_take_the_run_with_it() {
     let mut viewer = Viewer::start(&here);
     let hash = |run: &str| here.json(&format!("{run}/summary.json"))["state_hash"].clone();
     here.grainscope(&arguments("whole", &["--no-recording"])).exits(0);
-    // It sticks after some pictures.
+    // The viewer stops reading after some pictures.
     let port = slow_line(&viewer, f64::INFINITY, 400_000);
     let said = here.grainscope(&arguments("stuck", &["--connect", &address(port)])).exits(0);
     said.complains(&["warning: the viewer at rerun+http://127.0.0.1"]);
     assert_eq!(hash("stuck"), hash("whole"));
     recorded_whole(&here, "stuck");
-    // It is killed.
+    // The viewer is killed.
     let url = address(viewer.port);
     let run = arguments("run", &["--connect", &url]);
     let child = here.start(&run);
@@ -258,13 +261,13 @@ fn a_viewer_that_dies_or_sticks_does_not_take_the_run_with_it() {
     recorded_whole(&here, "run");
 }
 
-/// Of what is recorded nothing is lost, however slow a viewer is; of what is only watched the oldest
-/// is dropped, and counted.
+/// If a run is recorded, a slow viewer causes no loss. If it is only watched, the oldest pictures
+/// are dropped and counted.
 #[test]
 fn a_slow_viewer_loses_only_what_may_be_lost() {
     let here = TempFolder::new();
     let viewer = Viewer::start(&here);
-    // Many small pictures, faster than they can be shown.
+    // Many small pictures, made faster than they can be shown.
     let scene = ["run", "couette_cosserat", "--set", "accuracy.cells=8"];
     let pace = ["--set", "time.max_step=2e-4", "--set", "recording.frames=100000"];
     let watch = |out: &str, more: &[&str]| {
@@ -273,13 +276,13 @@ fn a_slow_viewer_loses_only_what_may_be_lost() {
         (said.code == Some(0)).then(|| here.json(&format!("{out}/summary.json")))
     };
     let alone = watch("alone", &["--no-recording"]).expect("a run");
-    // How slow a line must be depends on how fast this machine is just now.
+    // The required rate depends on the present speed of this machine.
     let mut told = Vec::new();
     for (k, rate) in [8e6, 4e6, 2e6, 1e6].into_iter().enumerate() {
         let url = address(slow_line(&viewer, rate, usize::MAX));
         let out = format!("kept{k}");
         let kept = watch(&out, &["--connect", &url]).expect("a run");
-        // One that is too slow is given up, and then there is nothing to go on for.
+        // A viewer that is too slow is disconnected; without a recording the run then ends.
         let watched = watch(&format!("watched{k}"), &["--no-recording", "--connect", &url]);
         recorded_whole(&here, &out);
         assert_eq!(kept["frames"]["dropped"], 0);
@@ -289,7 +292,7 @@ fn a_slow_viewer_loses_only_what_may_be_lost() {
         }
         let some = |summary: &Value, what: &str| summary["frames"][what].as_u64() > Some(0);
         if let Some(watched) = &watched {
-            assert!(!some(watched, "waits"), "who only watches keeps nobody waiting");
+            assert!(!some(watched, "waits"), "a viewer that only watches delayed the run");
             told.push((rate, kept["frames"].to_string(), watched["frames"].to_string()));
             if some(&kept, "waits") && some(watched, "dropped") {
                 println!("{told:#?}");
@@ -297,7 +300,7 @@ fn a_slow_viewer_loses_only_what_may_be_lost() {
             }
         }
     }
-    panic!("no line was slow: {told:#?}");
+    panic!("no connection was slow enough: {told:#?}");
 }
 
 #[test]
@@ -315,7 +318,7 @@ fn a_port_that_is_taken_is_named() {
 fn a_run_is_the_same_however_it_is_watched() {
     let here = TempFolder::new();
     let steps = ["--steps", "6"];
-    // Whatever must not change a result belongs here.
+    // Options that must not change the result.
     let ways: [&[&str]; 9] = [
         &[],
         &[],
@@ -337,7 +340,7 @@ fn a_run_is_the_same_however_it_is_watched() {
     assert_eq!(states.len(), 1, "{states:?}");
 }
 
-/// Sums round differently; what is measured does not depend on it.
+/// Instruction sets differ only by rounding, so that gauges agree.
 #[test]
 fn instruction_sets_agree_on_gauges() {
     let here = TempFolder::new();
@@ -350,7 +353,7 @@ fn instruction_sets_agree_on_gauges() {
     let mut hashes = Vec::new();
     let mut gauges: Vec<Vec<Vec<f64>>> = Vec::new();
     for set in &sets {
-        // One by the option, the other by the environment.
+        // The first run is set by the option, the second by the environment variable.
         here.grainscope(&arguments(set, &["--simd", set])).exits(0);
         let other = format!("{set}-again");
         let again = arguments(&other, &["--no-recording"]);
@@ -371,7 +374,7 @@ fn instruction_sets_agree_on_gauges() {
             assert!(apart <= 1e-9 * largest, "{set}: {apart} of {largest}");
         }
     }
-    // They are different programs: otherwise nothing was compared.
+    // The states must differ in rounding; otherwise the option has no effect.
     if sets.len() > 1 {
         hashes.dedup();
         assert!(hashes.len() > 1, "the option has no effect");
@@ -385,7 +388,7 @@ fn a_scene_that_the_machine_has_no_memory_for_is_refused() {
     let total = text.lines().find(|l| l.starts_with("MemTotal")).map_or("", |l| &l[9..]);
     let kib: f64 = total.trim().trim_end_matches(" kB").parse().unwrap_or(f64::INFINITY);
     if kib > 64e6 {
-        eprintln!("skipped: this machine has memory enough, or does not say");
+        eprintln!("skipped: this machine has enough memory, or does not report it");
         return;
     }
     let here = TempFolder::new();
@@ -395,11 +398,11 @@ fn a_scene_that_the_machine_has_no_memory_for_is_refused() {
         said.complains(&["cells need about", "GB of memory", "this machine has", "lower accuracy"]);
     }
     assert!(!here.has("runs"));
-    here.grainscope(&["plan", "silo", "--no-measure"]).exits(0).complains(&["a run takes about"]);
+    here.grainscope(&["plan", "silo", "--no-measure"]).exits(0).complains(&["a run needs about"]);
 }
 
 #[test]
-fn the_doctor_knows_what_a_bug_report_needs() {
+fn doctor_reports_all_facts_for_a_bug_report() {
     let here = TempFolder::new();
     let facts = here.grainscope(&["doctor", "--json"]).exits(0).json();
     let keys = [

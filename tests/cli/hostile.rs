@@ -1,8 +1,9 @@
-//! Inputs made to break: scenes, expressions, `--set`, checkpoints, recordings, requests.
+//! Fuzz tests of scenes, expressions, `--set`, checkpoints, recordings and HTTP requests.
 //!
-//! Each must be refused, or taken, within a second and without a panic. Inputs are those of a corpus
-//! (the presets, what a run leaves) with parts cut, doubled, swapped and replaced; the seed and
-//! the number of an input say which it was. `GRAINSCOPE_INPUTS` is how many.
+//! Each input must be refused or accepted within a second and without a panic. Inputs are valid
+//! files (presets, files of a run) with parts cut, duplicated, swapped and replaced. The seed
+//! (`GRAINSCOPE_SEED`) and the number of an input identify it. `GRAINSCOPE_INPUTS` is the number of
+//! inputs.
 
 use super::killed::{effort, random};
 use super::*;
@@ -22,12 +23,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Longest that an input may take.
+/// Longest time for one input.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Most memory that all these tests together may ever take (kB).
+/// Largest peak memory of all these tests together, kB.
 const MEMORY: u64 = 1_000_000;
 
-/// Hands one input to what is tested; a panic or a delay fails with the input.
+/// Tests one input. If it panics or takes too long, the input is written to a file and shown.
 fn try_one(what: &str, number: u64, input: &[u8], test: impl FnOnce()) {
     let clock = Instant::now();
     let outcome = catch_unwind(AssertUnwindSafe(test));
@@ -36,12 +37,12 @@ fn try_one(what: &str, number: u64, input: &[u8], test: impl FnOnce()) {
         let path = std::env::temp_dir().join(format!("grainscope-hostile-{what}-{number}"));
         std::fs::write(&path, input).expect("written");
         let shown = String::from_utf8_lossy(&input[..input.len().min(2000)]).into_owned();
-        let how = if outcome.is_err() { "panics" } else { "is slow" };
-        panic!("{what} {number} {how} ({took:?}); it is in {}:\n{shown}", path.display());
+        let how = if outcome.is_err() { "panics" } else { "is too slow" };
+        panic!("{what} {number} {how} ({took:?}); the input is in {}:\n{shown}", path.display());
     }
 }
 
-/// Pieces that parsers stumble over.
+/// Text fragments that are difficult for parsers.
 const PIECES: [&str; 40] = [
     "",
     "0",
@@ -85,7 +86,7 @@ const PIECES: [&str; 40] = [
     "cells = 90000\n",
 ];
 
-/// A text with some parts changed.
+/// A text with random changes.
 fn mutated(random: &mut Pcg64Mcg, text: &str) -> String {
     let mut chars: Vec<char> = text.chars().collect();
     for _ in 0..random.random_range(1..5) {
@@ -104,7 +105,7 @@ fn mutated(random: &mut Pcg64Mcg, text: &str) -> String {
                 chars.splice(at..to.min(at + 6), piece.chars());
             }
             4 => {
-                // A number by another.
+                // Replaces a digit by another number.
                 let digits = chars.iter().enumerate().filter(|(_, c)| c.is_ascii_digit());
                 let digits: Vec<usize> = digits.map(|d| d.0).collect();
                 if let Some(&digit) = digits.choose(random) {
@@ -113,7 +114,7 @@ fn mutated(random: &mut Pcg64Mcg, text: &str) -> String {
                 }
             }
             _ => {
-                // Two lines change places.
+                // Swaps two lines.
                 let text: String = chars.iter().collect();
                 let mut lines: Vec<&str> = text.lines().collect();
                 if lines.len() > 1 {
@@ -128,7 +129,7 @@ fn mutated(random: &mut Pcg64Mcg, text: &str) -> String {
     chars.into_iter().collect()
 }
 
-/// Bytes with some parts changed.
+/// Bytes with random changes.
 fn mutated_bytes(random: &mut Pcg64Mcg, bytes: &[u8]) -> Vec<u8> {
     let mut out = bytes.to_vec();
     for _ in 0..random.random_range(1..4) {
@@ -158,7 +159,7 @@ fn mutated_bytes(random: &mut Pcg64Mcg, bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Runs a share of all inputs; how many they were.
+/// Runs a share of all inputs and returns their number; checks the peak memory.
 fn inputs(share: f64, mut each: impl FnMut(&mut Pcg64Mcg, u64)) -> u64 {
     let count = (share * effort("GRAINSCOPE_INPUTS", 20_000) as f64).ceil() as u64;
     let mut random = random();
@@ -166,7 +167,7 @@ fn inputs(share: f64, mut each: impl FnMut(&mut Pcg64Mcg, u64)) -> u64 {
     if let Ok(status) = std::fs::read_to_string("/proc/self/status") {
         let line = status.lines().find(|l| l.starts_with("VmHWM:")).expect("a peak");
         let peak: u64 = line.split_whitespace().nth(1).expect("kB").parse().expect("a number");
-        assert!(peak < MEMORY, "{peak} kB of memory were taken");
+        assert!(peak < MEMORY, "the peak memory is {peak} kB");
     }
     count
 }
@@ -191,7 +192,7 @@ fn scenes() {
             }
         });
     });
-    println!("{count} scenes: {refused} refused, {taken} taken");
+    println!("{count} scenes: {refused} refused, {taken} accepted");
     assert!(refused > count / 4 && taken > 0);
 }
 
@@ -259,7 +260,7 @@ fn checkpoints() {
     let (mut refused, mut taken) = (0, 0);
     let count = inputs(0.17, |random, k| {
         let mut bytes = mutated_bytes(random, &good);
-        // Half of them by somebody who knows how to make the checksum.
+        // Half of them get a valid checksum.
         let forged = random.random_bool(0.5);
         if forged && bytes.len() > 32 {
             bytes = checkpoint::sealed(bytes[..bytes.len() - 32].to_vec());
@@ -267,8 +268,8 @@ fn checkpoints() {
         try_one("checkpoint", k, &bytes, || match checkpoint::decode(&bytes, &hash) {
             Err(_) => refused += 1,
             Ok(forged_state) => {
-                assert!(forged || bytes == good, "a damaged checkpoint was taken");
-                // Seldom: it takes a while.
+                assert!(forged || bytes == good, "a damaged checkpoint was accepted");
+                // Only for some inputs, because it is slow.
                 if k % 10 == 0 && run.restore(&forged_state).is_ok() {
                     taken += 1;
                     run.restore(&state).expect("a good state");
@@ -276,11 +277,11 @@ fn checkpoints() {
             }
         });
     });
-    println!("{count} checkpoints: {refused} refused, {taken} forged ones taken");
+    println!("{count} checkpoints: {refused} refused, {taken} forged ones accepted");
     assert!(refused > count / 3);
 }
 
-/// A recording with its data as it is.
+/// The same recording, uncompressed.
 fn uncompressed(recording: &[u8]) -> Vec<u8> {
     let messages = DecoderApp::decode_eager(recording).expect("a recording");
     let mut plain = Vec::new();
@@ -295,7 +296,7 @@ fn uncompressed(recording: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// Lengths that a forger puts into data, on both sides of its compression.
+/// Forged lengths in uncompressed data must not lead to large allocations.
 #[test]
 fn recordings_that_claim_to_be_large() {
     let here = TempFolder::new();
@@ -304,9 +305,9 @@ fn recordings_that_claim_to_be_large() {
     let good = std::fs::read(here.path("run/recording.rrd")).expect("a recording");
     let plain = uncompressed(&good);
     std::fs::write(here.path("plain.rrd"), &plain).expect("written");
-    here.grainscope(&["repair", "plain.rrd"]).exits(0).prints(&["is whole"]);
-    // A part of an Arrow stream begins with this mark and the length of its description, in which the
-    // length of its body is somewhere.
+    here.grainscope(&["repair", "plain.rrd"]).exits(0).prints(&["is complete"]);
+    // A message of an Arrow stream begins with this marker and the length of its metadata, which
+    // contain the length of its body.
     let parts: Vec<usize> =
         (0..plain.len() - 128).filter(|&k| plain[k..k + 4] == [0xff; 4]).collect();
     assert!(parts.len() > 20);
@@ -319,14 +320,14 @@ fn recordings_that_claim_to_be_large() {
             let mut forged = plain.clone();
             forged[at..at + bytes.len()].copy_from_slice(&bytes);
             std::fs::write(&path, &forged).expect("written");
-            // If a length is believed this ends here: nobody has as much memory.
+            // If a length were trusted, the allocation would fail and abort the test.
             refused += u64::from(match Recorded::open(&path) {
                 Ok(recorded) => recorded.cut.is_some(),
                 Err(_) => true,
             });
         }
     }
-    println!("{refused} forged recordings were told");
+    println!("{refused} forged recordings were detected");
     assert!(refused > 20);
 }
 
@@ -336,7 +337,7 @@ fn recordings() {
     let run = ["run", "couette_cosserat", "--set", "accuracy.cells=4", "--steps", "2"];
     here.grainscope(&[&run[..], &["--out", "run"]].concat()).exits(0);
     let good = std::fs::read(here.path("run/recording.rrd")).expect("a recording");
-    // In one that is not compressed, changes come to what lies inside of its data.
+    // In an uncompressed recording, changes also affect the data itself.
     let corpus = [uncompressed(&good), good];
     let path = here.path("x.rrd");
     let (mut refused, mut taken) = (0, 0);
@@ -360,7 +361,7 @@ fn recordings() {
         });
         let _ = open_all(&[path.clone(), path.clone()]);
     });
-    println!("{count} recordings: {refused} refused, {taken} read as far as they go");
+    println!("{count} recordings: {refused} refused, {taken} read up to their damage");
 }
 
 #[test]
@@ -401,7 +402,7 @@ fn requests() {
         let _ = stream.read_to_end(&mut answer);
         Some(answer)
     };
-    // Clients that say next to nothing and stay keep nobody else waiting.
+    // Clients that send almost nothing and stay connected do not block others.
     let slow: Vec<TcpStream> = (0..64)
         .map(|_| {
             let mut stream = TcpStream::connect(address).expect("a connection");
@@ -412,7 +413,7 @@ fn requests() {
     let count = inputs(0.05, |random, k| {
         let text = corpus.choose(random).expect("some");
         let bytes = mutated_bytes(random, text.as_bytes());
-        // Not one that ends the session.
+        // Inputs that would end the session are left out.
         if bytes.windows(4).any(|w| w == b"quit") {
             return;
         }
@@ -423,10 +424,10 @@ fn requests() {
     let answer = send(corpus[1].as_bytes()).expect("a connection");
     assert!(answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
     drop(slow);
-    assert!(child.try_wait().expect("known").is_none(), "it still serves");
+    assert!(child.try_wait().expect("known").is_none(), "the server has ended");
     child.kill().expect("killed");
     let said = child.wait_with_output().expect("an end");
     let said = String::from_utf8_lossy(&said.stderr).into_owned();
     assert!(!said.contains("panicked"), "{said}");
-    println!("{count} requests, and it still serves");
+    println!("{count} requests; the server still answers");
 }

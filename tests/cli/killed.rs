@@ -1,20 +1,22 @@
-//! Runs that are killed at any moment, or told to end.
+//! Tests of runs that are killed at a random time or stopped by a signal.
 
 use super::*;
 use rand::{Rng, SeedableRng};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-/// How much is tried: a few in CI, many in the long tier (`.ci/run --long`).
+/// Number from an environment variable, or `usual` if it is not set. Long tests (`.ci/run --long`)
+/// set larger numbers.
 pub fn effort(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().expect("a number"))
 }
 
+/// Random numbers with the seed `GRAINSCOPE_SEED`.
 pub fn random() -> rand_pcg::Pcg64Mcg {
     rand_pcg::Pcg64Mcg::seed_from_u64(effort("GRAINSCOPE_SEED", 1))
 }
 
-/// A silo of some steps, with pictures and checkpoints on the way.
+/// A run of the silo with some steps, pictures and checkpoints; the output folder follows.
 const RUN: [&str; 11] = [
     "run",
     "silo",
@@ -33,7 +35,7 @@ fn arguments(out: &str) -> Vec<&str> {
     [&RUN[..], &[out]].concat()
 }
 
-/// Starts, and kills after a while unless it has ended; whether it was killed.
+/// Starts the program and kills it after a time. False if it had already ended.
 fn killed(here: &TempFolder, arguments: &[&str], after: Duration) -> bool {
     let mut child = here
         .command(arguments)
@@ -49,7 +51,7 @@ fn killed(here: &TempFolder, arguments: &[&str], after: Duration) -> bool {
     running
 }
 
-/// Every row that is there is whole.
+/// Checks that all rows of the table are complete, and returns their number.
 fn whole_rows(here: &TempFolder, out: &str) -> usize {
     let path = format!("{out}/series.csv");
     if !here.has(&path) || here.read(&path).is_empty() {
@@ -61,22 +63,22 @@ fn whole_rows(here: &TempFolder, out: &str) -> usize {
     steps.len()
 }
 
-/// The recording opens, and has no gap; its number of steps.
+/// Checks that the recording can be read and has no gap, and returns its number of steps.
 fn opens(here: &TempFolder, out: &str) -> usize {
     let file = format!("{out}/recording.rrd");
     if !here.has(&file) || std::fs::metadata(here.path(&file)).expect("a file").len() < 100 {
-        // Killed while it was made: nothing had been recorded.
+        // Killed while the file was created: nothing had been recorded.
         assert!(whole_rows(here, out) < 2);
         return 0;
     }
-    // The viewer and its SDKs read what is cut; repaired it is whole for all its tools.
+    // A truncated file can be read by the viewer and its SDKs; after a repair by all tools.
     let copy = format!("{out}.rrd");
     std::fs::copy(here.path(&file), here.path(&copy)).expect("a copy");
     here.grainscope(&["repair", &copy]).exits(0);
-    here.grainscope(&["repair", &copy]).exits(0).prints(&["is whole"]);
+    here.grainscope(&["repair", &copy]).exits(0).prints(&["is complete"]);
     let (store, blueprints) = recording::begun_recording(&here.path(&copy));
     let steps = recording::steps(&store);
-    // The layout comes before the first step.
+    // The layout is recorded before the first step.
     assert!(blueprints == 1 || steps.is_empty(), "{blueprints} blueprints, {steps:?}");
     assert_eq!(steps, (0..steps.len() as i64).collect::<Vec<_>>());
     steps.len()
@@ -99,7 +101,7 @@ fn killed_at_any_moment_nothing_is_lost() {
         }
         let out = format!("run{k}");
         kills += u64::from(killed(&here, &arguments(&out), moment(&mut random)));
-        // Every other one is killed again while it goes on.
+        // Half of the runs are killed again after they are resumed.
         loop {
             whole_rows(&here, &out);
             opens(&here, &out);
@@ -112,7 +114,7 @@ fn killed_at_any_moment_nothing_is_lost() {
         if said.code == Some(0) {
             resumed += 1;
         } else {
-            // Before the first checkpoint: said so, with what to do.
+            // Killed before the first checkpoint: the run must be started again.
             let checkpoints = here.path(&out).join("checkpoints");
             let any = std::fs::read_dir(checkpoints).into_iter().flatten().flatten();
             let whole = any.filter(|e| e.path().extension().is_some_and(|e| e == "state")).count();
@@ -126,7 +128,7 @@ fn killed_at_any_moment_nothing_is_lost() {
         assert_eq!(opens(&here, &out), whole.rows.len());
         std::fs::remove_dir_all(here.path(&out)).expect("removed");
     }
-    println!("{kills} kills: {resumed} runs resumed, {restarted} begun again, all to {hash}");
+    println!("{kills} kills: {resumed} runs resumed, {restarted} restarted, all ended with {hash}");
 }
 
 #[cfg(unix)]
@@ -149,8 +151,8 @@ fn told_to_end_a_run_ends_within_a_step() {
         assert!(Command::new("kill").args([&signal_arg, &id]).status().expect("kill").success());
         let at_least = rows().expect("rows");
         let said = Said::new(&run, child.wait_with_output().expect("an end")).exits(130);
-        said.prints(&["silo interrupted", &format!("grainscope resume {signal} goes on")]);
-        // The step under way was finished; another may have been before the signal was delivered.
+        said.prints(&["silo interrupted", &format!("grainscope resume {signal} continues")]);
+        // The current step is finished; one more may be taken before the signal is delivered.
         assert!(rows().expect("rows") <= at_least + 2);
         here.grainscope(&["resume", signal]).exits(0);
         assert_eq!(here.json(&format!("{signal}/summary.json"))["state_hash"], hash);

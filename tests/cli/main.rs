@@ -1,4 +1,4 @@
-//! The program as a user meets it: arguments in; exit code, text and files out.
+//! Tests of the command-line program: exit codes, printed text and written files.
 
 mod commands;
 mod compare;
@@ -18,7 +18,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
-/// A folder that is gone when the test is.
+/// A temporary folder, deleted at the end of the test.
 struct TempFolder(grainscope::testing::TempFolder);
 
 impl TempFolder {
@@ -47,27 +47,28 @@ impl TempFolder {
         self.path(name).exists()
     }
 
-    /// The program, to be started in this folder.
+    /// A command that runs the program in this folder.
     fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_grainscope"));
         command.args(arguments).current_dir(self.0.path()).env("NO_COLOR", "1");
         command
     }
 
-    /// The program, started in this folder; its words are kept for who waits for it.
+    /// Starts the program in this folder; its output can be read at its end.
     fn start(&self, arguments: &[&str]) -> Child {
         let mut command = self.command(arguments);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         command.spawn().expect("the program starts")
     }
 
+    /// Runs the program in this folder to its end.
     fn grainscope(&self, arguments: &[&str]) -> Said {
         let output = self.command(arguments).output().expect("the program starts");
         Said::new(arguments, output)
     }
 }
 
-/// What the program answered.
+/// Exit code and output of the program.
 struct Said {
     arguments: String,
     code: Option<i32>,
@@ -86,6 +87,7 @@ impl Said {
         }
     }
 
+    /// Checks the exit code.
     #[track_caller]
     fn exits(self, code: i32) -> Self {
         let Said { arguments, out, err, .. } = &self;
@@ -94,7 +96,7 @@ impl Said {
         self
     }
 
-    /// Whether stderr says all of this, wherever its lines are broken.
+    /// Checks that stderr contains all parts, ignoring line breaks.
     #[track_caller]
     fn complains(self, parts: &[&str]) -> Self {
         let said = flat(&self.err);
@@ -104,6 +106,7 @@ impl Said {
         self
     }
 
+    /// Checks that stdout contains all parts.
     #[track_caller]
     fn prints(self, parts: &[&str]) -> Self {
         for part in parts {
@@ -113,6 +116,7 @@ impl Said {
         self
     }
 
+    /// Standard output as JSON.
     #[track_caller]
     fn json(&self) -> Value {
         serde_json::from_str(&self.out)
@@ -120,12 +124,12 @@ impl Said {
     }
 }
 
-/// The text without its line breaks and the frame that an error is drawn in.
+/// The text without line breaks and without the frame of an error message.
 fn flat(text: &str) -> String {
     text.replace(['│', '×'], " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Preset names and the texts of their files.
+/// Names of the presets, and the contents of their files.
 fn preset_files() -> Vec<(String, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("presets");
     let mut list: Vec<_> = std::fs::read_dir(folder)
@@ -149,7 +153,7 @@ struct Table {
 }
 
 impl Table {
-    /// Reads a CSV file; every row must be whole.
+    /// Reads a CSV file; every row must be complete.
     #[track_caller]
     fn read(text: &str) -> Self {
         assert!(text.ends_with('\n'), "the last row is cut: {text:?}");
@@ -162,16 +166,19 @@ impl Table {
         Table { columns, rows }
     }
 
+    /// A column as text.
     fn text(&self, name: &str) -> Vec<&str> {
         let at = self.columns.iter().position(|c| c == name);
         let at = at.unwrap_or_else(|| panic!("no column {name} in {:?}", self.columns));
         self.rows.iter().map(|row| row[at].as_str()).collect()
     }
 
+    /// A column as numbers.
     fn numbers(&self, name: &str) -> Vec<f64> {
         self.text(name).iter().map(|v| v.parse().expect("a number")).collect()
     }
 
+    /// All rows without one column.
     fn without(&self, name: &str) -> Vec<Vec<&str>> {
         let kept = self.columns.iter().enumerate().filter(|(_, c)| *c != name);
         let kept: Vec<usize> = kept.map(|(i, _)| i).collect();

@@ -1,4 +1,4 @@
-//! Recordings are read back and compared with the run; their faults are told.
+//! Tests that recordings agree with their runs, and that their errors are reported.
 
 use super::*;
 use grainscope::frame::{Frame, ParticleSnapshot, Picture, Rect, RunInfo, Scalar};
@@ -16,14 +16,14 @@ fn stores(path: &Path) -> Vec<ChunkStore> {
         .collect()
 }
 
-/// The recording of a file that has one, and a blueprint.
+/// The recording in a file with one recording and one blueprint.
 pub fn recording(path: &Path) -> ChunkStore {
     let (recording, blueprints) = begun_recording(path);
     assert_eq!(blueprints, 1);
     recording
 }
 
-/// The recording of a file that has one, and its number of blueprints.
+/// The recording in a file with one recording, and the number of blueprints.
 pub fn begun_recording(path: &Path) -> (ChunkStore, usize) {
     let (mut recordings, blueprints): (Vec<_>, Vec<_>) =
         stores(path).into_iter().partition(|store| store.id().kind() == StoreKind::Recording);
@@ -31,18 +31,18 @@ pub fn begun_recording(path: &Path) -> (ChunkStore, usize) {
     (recordings.remove(0), blueprints.len())
 }
 
-/// Steps of the run, in order.
+/// Steps of a recording, in order.
 pub fn steps(store: &ChunkStore) -> Vec<i64> {
     let step = TimelineName::from("step");
     let chunks = store.iter_physical_chunks();
     let all =
         chunks.flat_map(|c| c.iter_indices(&step).map(|(t, _)| t.as_i64()).collect::<Vec<_>>());
-    // What is static has no step: the least number stands for it.
+    // Static data have no step; they have the smallest number instead.
     let set: BTreeSet<i64> = all.filter(|&step| step >= 0).collect();
     set.into_iter().collect()
 }
 
-/// Positions of an entity by step.
+/// Positions of the points of an entity, by step.
 fn positions(store: &ChunkStore, entity: &str) -> BTreeMap<i64, Vec<[f32; 2]>> {
     let component = rerun::Points2D::descriptor_positions().component;
     let step = TimelineName::from("step");
@@ -61,7 +61,7 @@ fn positions(store: &ChunkStore, entity: &str) -> BTreeMap<i64, Vec<[f32; 2]>> {
 #[test]
 fn a_run_is_read_back() {
     let here = TempFolder::new();
-    // 100 frames over 3.8 ms become two until 50 us, beside the first.
+    // With 100 frames in 3.8 ms there are two until 50 us, besides the first.
     let run = ["run", "silo", "--set", "accuracy.cells=3", "--until", "5e-5"];
     here.grainscope(&run).exits(0);
     let series = Table::read(&here.read("runs/silo/series.csv"));
@@ -120,7 +120,7 @@ fn a_run_is_read_back() {
     assert_eq!(pictures.keys().copied().collect::<Vec<_>>(), met);
     let first = &pictures[&0];
     assert!(first.len() > 1000);
-    // The grains fill x = -2 to 2, y = 3 to 7, with y up.
+    // The grains fill x = -2 to 2, y = 3 to 7; y points up.
     let range = |c: usize| {
         let values = first.iter().map(|p| p[c]);
         (values.clone().fold(f32::INFINITY, f32::min), values.fold(f32::NEG_INFINITY, f32::max))
@@ -129,7 +129,7 @@ fn a_run_is_read_back() {
         assert!(low >= from && low < from + 0.1, "{low}");
         assert!(high <= to && high > to - 0.1, "{high}");
     }
-    // They fall.
+    // The grains fall.
     let lowest = |p: &[[f32; 2]]| p.iter().map(|p| p[1]).fold(f32::INFINITY, f32::min);
     assert!(lowest(&pictures[&last]) < lowest(first) - 0.05);
 }
@@ -194,7 +194,7 @@ fn arrays_of_different_length_are_an_error() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_an_error_that_names_its_cause() {
+fn a_full_disk_is_an_error_that_gives_the_cause() {
     let error = record(Path::new("/dev/full"), (0..30).map(frame)).expect_err("a full disk");
     assert!(error.to_string().contains("No space left"), "{error}");
 }
@@ -206,7 +206,7 @@ fn a_missing_folder_is_an_error_at_once() {
 }
 
 #[test]
-fn an_address_that_is_none_is_an_error_with_an_example() {
+fn an_invalid_address_is_an_error_with_an_example() {
     let error = refusal(Sink::Connect("nonsense".into()));
     assert!(error.contains("nonsense") && error.contains("rerun+http://"), "{error}");
 }
@@ -237,6 +237,6 @@ fn a_recording_is_served_and_saved_at_once() {
     let (address, query) = address.split_once('/').expect("a path");
     assert!(query.starts_with("?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A"), "{query}");
     std::net::TcpStream::connect(address).expect("the page answers");
-    // Complete although still served.
+    // The file is complete while the recording is still served.
     assert_eq!(steps(&recording(&path)).len(), 20);
 }

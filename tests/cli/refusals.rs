@@ -1,4 +1,4 @@
-//! Scenes that cannot be: each is refused with exit code 3, the place or key, and a remedy.
+//! Invalid scenes are refused with exit code 3, the location or key of the error, and a remedy.
 
 use super::*;
 
@@ -45,8 +45,8 @@ from = [1.5, 0.25]
 to = [1.5, 0.75]
 "#;
 
-/// What is replaced in the box by what; the text that the complaint points at, or "" if it names
-/// the key; and what it says.
+/// An invalid scene: text of the box, its replacement, the text at the reported location ("" if the
+/// message names the key instead), and parts of the message.
 type Fault<'a> = (&'a str, &'a str, &'a str, &'a [&'a str]);
 
 const FAULTS: &[Fault] = &[
@@ -158,7 +158,7 @@ const FAULTS: &[Fault] = &[
     ("[domain]", "[domain", "", &["not TOML", "check the TOML syntax"]),
 ];
 
-/// `file:line:column` of a piece of text.
+/// `[file:line:column]` of a piece of text.
 fn place(text: &str, piece: &str) -> String {
     let at = text.find(piece).unwrap_or_else(|| panic!("no {piece:?} in {text}"));
     let before = &text[..at];
@@ -167,7 +167,7 @@ fn place(text: &str, piece: &str) -> String {
 }
 
 #[test]
-fn the_box_itself_is_valid_and_at_rest() {
+fn the_box_is_valid_and_at_rest() {
     let here = TempFolder::new();
     here.write("box.toml", BOX);
     here.grainscope(&["check", "box.toml"]).exits(0).prints(&["box.toml: ok (box)"]);
@@ -177,7 +177,7 @@ fn the_box_itself_is_valid_and_at_rest() {
 }
 
 #[test]
-fn faults_are_placed_and_come_with_a_remedy() {
+fn errors_have_a_location_and_a_remedy() {
     let here = TempFolder::new();
     for (from, to, at, complaints) in FAULTS {
         assert!(BOX.contains(from), "{from}");
@@ -192,11 +192,11 @@ fn faults_are_placed_and_come_with_a_remedy() {
             }
         }
     }
-    assert!(!here.has("runs"), "scenes that are refused leave no folder behind");
+    assert!(!here.has("runs"), "a refused scene created a folder");
 }
 
 #[test]
-fn what_is_no_scene_file_is_refused() {
+fn files_that_are_not_scenes_are_refused() {
     let here = TempFolder::new();
     here.write("empty.toml", "");
     let garbage: Vec<u8> =
@@ -217,14 +217,14 @@ fn what_is_no_scene_file_is_refused() {
         for command in ["check", "plan", "run"] {
             let said = here.grainscope(&[command, file]).exits(3);
             let said = said.complains(&[file, complaint, "help: "]);
-            assert!(!said.err.contains('\u{1b}'), "{file} steers the terminal");
+            assert!(!said.err.contains('\u{1b}'), "{file}: control characters");
         }
     }
     assert!(!here.has("runs"));
 }
 
 #[test]
-fn settings_that_do_not_fit_are_refused() {
+fn invalid_set_assignments_are_refused() {
     let here = TempFolder::new();
     for (set, complaints) in [
         ("alpa=1", ["--set alpa=1: there is no parameter `alpa`", "did you mean `alpha`?"]),

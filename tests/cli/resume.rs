@@ -1,9 +1,9 @@
-//! Runs that end before their end, and go on.
+//! Tests of runs that are stopped early and resumed.
 
 use super::*;
 use std::collections::BTreeMap;
 
-/// Half a minute of a silo in a fraction of a second.
+/// A coarse run of the silo, which takes a fraction of a second.
 const SILO: [&str; 5] = ["run", "silo", "--set", "accuracy.cells=3", "--set"];
 const FRAMES: &str = "recording.frames=400";
 
@@ -11,7 +11,7 @@ fn silo<'a>(out: &'a str, rest: &[&'a str]) -> Vec<&'a str> {
     [&SILO[..], &[FRAMES, "--out", out], rest].concat()
 }
 
-/// Checkpoints of a run, by name.
+/// File names of the checkpoints of a run, sorted.
 fn checkpoints(here: &TempFolder, run: &str) -> Vec<String> {
     let folder = here.path(run).join("checkpoints");
     let mut names: Vec<String> = std::fs::read_dir(folder)
@@ -23,7 +23,7 @@ fn checkpoints(here: &TempFolder, run: &str) -> Vec<String> {
     names
 }
 
-/// Rows of a recording: how often each step comes in each entity, and a digest of what it says.
+/// Steps at which each entity of a recording has data, sorted.
 fn rows(path: &Path) -> BTreeMap<String, Vec<i64>> {
     let store = recording::recording(path);
     let step = rerun::external::re_log_types::TimelineName::from("step");
@@ -34,12 +34,12 @@ fn rows(path: &Path) -> BTreeMap<String, Vec<i64>> {
         steps.extend(times.times_raw());
     }
     all.values_mut().for_each(|steps| steps.sort_unstable());
-    // Isolines are wiped when they are gone: how often depends on what was drawn before.
+    // Isolines are cleared when they vanish, which depends on earlier pictures.
     all.retain(|path, _| !path.ends_with("isolines") && !path.ends_with("log"));
     all
 }
 
-/// The table and the state of two runs are the same, but for the seconds that they took.
+/// Checks that two runs have the same table, except for their times, and the same final state.
 #[track_caller]
 fn same(here: &TempFolder, a: &str, b: &str) {
     let hash = |run: &str| here.json(&format!("{run}/summary.json"))["state_hash"].clone();
@@ -60,17 +60,17 @@ fn every_preset_goes_on_to_the_last_bit() {
         };
         let (whole, parts) = (format!("{name}-whole"), format!("{name}-parts"));
         run(&whole, "8");
-        run(&parts, "3").prints(&[&format!("grainscope resume {parts} goes on")]);
-        // Twice: a run that was taken up again can be taken up again.
+        run(&parts, "3").prints(&[&format!("grainscope resume {parts} continues")]);
+        // Twice, because a resumed run can be resumed again.
         here.grainscope(&["resume", &parts, "--steps", "5"]).exits(0);
         let said = here.grainscope(&["resume", &parts, "--steps", "8"]).exits(0);
-        said.complains(&["going on after step 5"]);
+        said.complains(&["continuing after step 5"]);
         same(&here, &whole, &parts);
     }
 }
 
 #[test]
-fn midpoint_steps_and_scheduled_changes_go_on_to_the_last_bit() {
+fn all_integrators_and_scheduled_changes_resume_bit_for_bit() {
     let here = TempFolder::new();
     let change = "[[schedule]]\nstep = 3\nset = { alpha = 0.1 }\n";
     let (source, _) = preset_files().into_iter().find(|(n, _)| n == "silo").expect("silo");
@@ -97,7 +97,7 @@ fn midpoint_steps_and_scheduled_changes_go_on_to_the_last_bit() {
 }
 
 #[test]
-fn table_and_recording_go_on_without_a_gap_or_a_doubled_row() {
+fn table_and_recording_resume_without_gaps_or_duplicates() {
     let here = TempFolder::new();
     here.grainscope(&silo("whole", &["--until", "8e-5"])).exits(0);
     here.grainscope(&silo("parts", &["--until", "8e-5", "--steps", "5"])).exits(0);
@@ -109,18 +109,18 @@ fn table_and_recording_go_on_without_a_gap_or_a_doubled_row() {
     assert!(whole[curve].len() > 8, "{:?}", whole[curve]);
     for (entity, mut steps) in parts {
         let same = entity.replace("/runs/parts/", "/runs/whole/");
-        // The state at the end of the first part was drawn, though no picture was due.
+        // The state at the end of the first part was drawn, although no picture was due.
         let due = &whole[&same];
         steps.retain(|step| due.contains(step) || *step != 5);
         steps.dedup_by(|a, b| a == b && *a == 5 && entity.contains("world/"));
         assert_eq!(&steps, due, "{entity}");
     }
     let said = here.grainscope(&["resume", "parts"]).exits(0);
-    said.prints(&["the run is finished; there is nothing to go on with"]);
+    said.prints(&["the run is finished; there is nothing to continue"]);
 }
 
 #[test]
-fn the_last_two_checkpoints_stay_and_a_bad_one_is_passed_over() {
+fn two_checkpoints_are_kept_and_a_damaged_one_is_skipped() {
     let here = TempFolder::new();
     let rest = ["--until", "8e-5", "--checkpoint-every", "2"];
     here.grainscope(&silo("whole", &rest)).exits(0);
@@ -129,7 +129,7 @@ fn the_last_two_checkpoints_stay_and_a_bad_one_is_passed_over() {
     let path = here.path("run/checkpoints/step-0000000007.state");
     let good = std::fs::read(&path).expect("a checkpoint");
 
-    // One bit.
+    // One bit is changed.
     let mut bytes = good.clone();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
@@ -137,19 +137,19 @@ fn the_last_two_checkpoints_stay_and_a_bad_one_is_passed_over() {
     let said = here.grainscope(&["resume", "run", "--steps", "8"]).exits(0);
     said.complains(&[
         "step-0000000007.state: is damaged",
-        "going on from the one before",
-        "going on after step 6",
+        "using the previous checkpoint",
+        "continuing after step 6",
     ]);
-    // Cut.
+    // All checkpoints are truncated.
     for name in checkpoints(&here, "run") {
         let path = here.path("run/checkpoints").join(name);
         let bytes = std::fs::read(&path).expect("a checkpoint");
         std::fs::write(&path, &bytes[..bytes.len() - 1]).expect("written");
     }
     let refused = here.grainscope(&["resume", "run"]).exits(1);
-    refused.complains(&["holds no checkpoint to go on from", "is damaged", "--force"]);
+    refused.complains(&["there is no checkpoint to continue from", "is damaged", "--force"]);
 
-    // Of another scene.
+    // The checkpoint of another scene.
     std::fs::remove_dir_all(here.path("run/checkpoints")).expect("removed");
     std::fs::create_dir(here.path("run/checkpoints")).expect("a folder");
     std::fs::write(&path, &good).expect("written");
@@ -165,13 +165,13 @@ fn the_last_two_checkpoints_stay_and_a_bad_one_is_passed_over() {
     here.grainscope(&["resume", "run"]).exits(0);
     same(&here, "whole", "run");
 
-    // --force takes what is there away.
+    // --force deletes the existing files.
     here.grainscope(&silo("run", &["--force", "--steps", "1"])).exits(0);
     assert_eq!(checkpoints(&here, "run"), ["step-0000000001.state"]);
 }
 
 #[test]
-fn what_cannot_go_on_says_why() {
+fn resume_errors_give_the_reason() {
     let here = TempFolder::new();
     here.grainscope(&["resume", "nowhere"]).exits(1).complains(&["no such folder"]);
     std::fs::create_dir(here.path("empty")).expect("a folder");
@@ -203,7 +203,7 @@ fn a_failed_run_leaves_its_last_good_state() {
         assert_eq!(checkpoints(&here, policy), ["step-0000000003.state"]);
         let summary = here.json(&format!("{policy}/summary.json"));
         assert_eq!((&summary["ending"], &summary["steps"]), (&"failed".into(), &3.into()));
-        // It can be taken up again, and fails again.
-        here.grainscope(&["resume", policy]).exits(5).complains(&["going on after step 3"]);
+        // It can be resumed, and fails again.
+        here.grainscope(&["resume", policy]).exits(5).complains(&["continuing after step 3"]);
     }
 }

@@ -1,4 +1,4 @@
-//! What a run writes, where, and how it ends.
+//! Tests of the files that a run writes, their folder, and how a run ends.
 
 use super::*;
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 const HEADER: &str = "step,time,dt,dt_limiter,wall,power_in,dissipation,power_error,\
                       divergence_error,volume_error,iterations,particles";
 
-/// Simple shear whose viscosity is scheduled to change.
+/// Simple shear with a scheduled change of the viscosity.
 const SHEAR: &str = r#"
 schema = 1
 name = "shear"
@@ -92,7 +92,7 @@ fn every_preset_runs_and_leaves_its_files() {
         for column in ["time", "max_speed", "particles"] {
             let last = series.numbers(column)[2];
             let said = summary[column].as_f64().expect("a number");
-            // Two readers of numbers may differ in the last digit.
+            // Two parsers of numbers may differ in the last digit.
             assert!((said - last).abs() <= 1e-14 * last.abs(), "{name}: {column} {said} {last}");
         }
         assert!(summary["unknowns"]["total"].as_u64() > Some(50));
@@ -132,7 +132,7 @@ fn a_run_is_repeated_by_its_scene_file() {
 }
 
 #[test]
-fn json_is_all_that_stdout_gets() {
+fn with_json_stdout_contains_only_json() {
     let here = TempFolder::new();
     here.write("shear.toml", SHEAR);
     let run = ["run", "shear.toml", "--json", "--steps", "2", "--no-recording"];
@@ -143,7 +143,7 @@ fn json_is_all_that_stdout_gets() {
 }
 
 #[test]
-fn a_recording_goes_where_it_is_asked_for() {
+fn a_recording_is_written_to_the_requested_file() {
     let here = TempFolder::new();
     here.write("shear.toml", SHEAR);
     let run = |rest: &[&str]| here.grainscope(&[&["run", "shear.toml"], rest].concat()).exits(0);
@@ -156,7 +156,7 @@ fn a_recording_goes_where_it_is_asked_for() {
 }
 
 #[test]
-fn runs_keep_out_of_each_other_s_folders() {
+fn runs_do_not_overwrite_each_other() {
     let here = TempFolder::new();
     here.write("shear.toml", SHEAR);
     let run = |rest: &[&str]| {
@@ -177,14 +177,14 @@ fn runs_keep_out_of_each_other_s_folders() {
     assert_ne!(here.read("runs/shear/summary.json"), before);
     assert_eq!(here.read("runs/shear/notes.txt"), "mine");
 
-    // A folder that holds no run is used as it is.
+    // An existing folder without a run is used.
     std::fs::create_dir(here.path("mine")).expect("a folder");
     here.write("mine/notes.txt", "mine");
     run(&["--out", "mine"]).exits(0);
 }
 
 #[test]
-fn a_run_that_cannot_start_leaves_nothing_behind() {
+fn a_run_that_cannot_start_leaves_no_files() {
     let here = TempFolder::new();
     here.write("shear.toml", SHEAR);
     for (rest, complaint) in [
@@ -217,7 +217,7 @@ fn without_an_internal_length_no_rotation_is_solved() {
 #[test]
 fn a_schedule_changes_the_flow_at_its_time() {
     let here = TempFolder::new();
-    // Without internal length the speed of the top is traction * height / viscosity.
+    // Without internal length the speed at the top is traction * height / viscosity.
     here.write("shear.toml", SHEAR);
     let run = ["run", "shear.toml", "--set", "length=0", "--no-recording"];
     here.grainscope(&run).exits(0);
@@ -231,10 +231,10 @@ fn a_schedule_changes_the_flow_at_its_time() {
 }
 
 #[test]
-fn a_schedule_cannot_change_what_is_solved() {
+fn a_schedule_cannot_change_effects_mesh_or_loads() {
     let here = TempFolder::new();
     for (set, complaints) in [
-        ("{ length = 0 }", ["schedule[0]", "solved effects", "a run of its own"]),
+        ("{ length = 0 }", ["schedule[0]", "solved effects", "a new run"]),
         (
             "{ \"accuracy.cells\" = 5 }",
             ["`accuracy.cells` cannot be scheduled", "schedule[0]", "`gravity[0]`"],
@@ -246,15 +246,15 @@ fn a_schedule_cannot_change_what_is_solved() {
     }
     here.write("shear.toml", SHEAR.replace("y = [0, 1]", "y = [0, \"eta\"]"));
     let moved = here.grainscope(&["check", "shear.toml"]).exits(3);
-    moved.complains(&["schedule[0]", "changes the mesh", "a run of its own"]);
-    // A load that follows the parameter is not silently left as it was.
+    moved.complains(&["schedule[0]", "changes the mesh", "a new run"]);
+    // A load that depends on the changed parameter is refused.
     here.write("shear.toml", SHEAR.replace("traction_x = 1", "traction_x = \"eta/2\""));
     let loaded = here.grainscope(&["check", "shear.toml"]).exits(3);
-    loaded.complains(&["schedule[0]", "loads", "a run of its own"]);
+    loaded.complains(&["schedule[0]", "loads", "a new run"]);
 }
 
 #[test]
-fn a_shorter_run_ends_where_it_is_told() {
+fn until_sets_the_end_time() {
     let here = TempFolder::new();
     here.write("shear.toml", SHEAR);
     let run = ["run", "shear.toml", "--until", "1/4", "--no-recording", "--json"];
@@ -265,7 +265,7 @@ fn a_shorter_run_ends_where_it_is_told() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupted_run_is_closed_in_order() {
+fn an_interrupted_run_leaves_complete_files() {
     let here = TempFolder::new();
     let run = ["run", "silo", "--set", "accuracy.cells=8", "--out", "out"];
     let child = here.start(&run);

@@ -1,10 +1,11 @@
-//! Twenty thousand steps: memory stays where it is. Part of the long tier (`.ci/run --long`).
+//! Long test (`.ci/run --long`): memory does not grow over 20,000 steps.
 
 use super::*;
 use grainscope::record::plots::{Axis, Curve, PlotSpec, line_plot};
 use std::process::Stdio;
 use std::time::Duration;
 
+/// Number of steps.
 const STEPS: usize = 20_000;
 
 /// Resident memory of a process, MB.
@@ -14,7 +15,7 @@ fn resident(id: u32) -> Option<f64> {
     line.split_whitespace().nth(1)?.parse::<f64>().ok().map(|kb| kb / 1e3)
 }
 
-/// Memory over the steps of a run, MB.
+/// Runs the scene, and returns pairs of step and resident memory (MB).
 fn soak(here: &TempFolder, out: &str, more: &[&str]) -> Vec<(f64, f64)> {
     let limit = format!("time.max_step={}", 1.0 / STEPS as f64);
     let steps = STEPS.to_string();
@@ -37,7 +38,7 @@ fn soak(here: &TempFolder, out: &str, more: &[&str]) -> Vec<(f64, f64)> {
         }
         let rows = std::fs::read_to_string(here.path(out).join("series.csv"))
             .map_or(0, |t| t.lines().count().saturating_sub(2));
-        // At the end the table is read for the plots.
+        // Not after the last step, when the table is read for the plots.
         let computing = rows > 0 && rows < STEPS;
         points.extend(resident(child.id()).filter(|_| computing).map(|mb| (rows as f64, mb)));
         std::thread::sleep(Duration::from_millis(250));
@@ -53,7 +54,7 @@ fn memory_stays_where_it_is() {
     let here = TempFolder::new();
     let path = format!("{}/presets/shear_alignment.toml", env!("CARGO_MANIFEST_DIR"));
     here.write("soak.toml", std::fs::read_to_string(path).expect("a preset"));
-    // The index that a recording ends with names all its parts: some hundred bytes a step.
+    // The index at the end of a recording lists all its parts: some hundred bytes per step.
     let runs = [("computing", &["--no-recording"][..], 0.5), ("recording too", &[], 15.0)];
     let mut curves = Vec::new();
     for (k, (name, more, most)) in runs.into_iter().enumerate() {

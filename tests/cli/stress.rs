@@ -1,9 +1,9 @@
-//! `grainscope stress`.
+//! Tests of `grainscope stress`.
 
 use super::*;
 
 #[test]
-fn the_quick_battery_holds() {
+fn the_quick_battery_passes() {
     let here = TempFolder::new();
     let said = here.grainscope(&["stress", "--quick", "--json"]).exits(0);
     let found = said.json();
@@ -17,7 +17,7 @@ fn the_quick_battery_holds() {
 }
 
 #[test]
-fn filters_choose_trials_and_a_table_is_printed() {
+fn filters_select_trials_and_a_table_is_printed() {
     let here = TempFolder::new();
     let said = here.grainscope(&["stress", "CLOSED box", "--keep", "kept"]).exits(0);
     assert_eq!(said.out.trim().lines().count(), 3, "{}", said.out);

@@ -1,10 +1,10 @@
-//! Sweeps: lists of cases, what is run again and what is not, tables, HyperQueue; and exports.
+//! Tests of sweeps: lists of cases, cases that are run again, tables, HyperQueue; and of exports.
 
 use super::*;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-/// Small and short: a run takes a fraction of a second.
+/// A sweep whose runs take a fraction of a second.
 const SMALL: [&str; 8] = [
     "sweep",
     "silo",
@@ -20,7 +20,7 @@ fn small<'a>(more: &[&'a str]) -> Vec<&'a str> {
     SMALL.iter().copied().chain(more.iter().copied()).collect()
 }
 
-/// Hash of the final state by id of the case.
+/// Hash of the final state of each case, by case id.
 fn hashes(here: &TempFolder, sweep: &str) -> std::collections::BTreeMap<String, String> {
     let list = here.json(&format!("{sweep}/cases.json"));
     let cases = list["cases"].as_array().expect("cases");
@@ -32,6 +32,7 @@ fn hashes(here: &TempFolder, sweep: &str) -> std::collections::BTreeMap<String, 
     cases.iter().map(one).collect()
 }
 
+/// Ids of all cases, in order.
 fn ids(here: &TempFolder, sweep: &str) -> Vec<String> {
     let list = here.json(&format!("{sweep}/cases.json"));
     let cases = list["cases"].as_array().expect("cases");
@@ -71,7 +72,7 @@ fn a_sweep_leaves_runs_tables_and_plots_and_runs_again_only_what_is_missing() {
     }
     assert_eq!(std::fs::read_dir(here.path("s/running")).expect("there").count(), 0);
 
-    // One is lost: it alone is run again, to the same bits.
+    // A deleted case is run again, with the same bits; the others are not.
     let before = hashes(&here, "s");
     let lost = ids(&here, "s").remove(2);
     let kept = ids(&here, "s").remove(0);
@@ -87,7 +88,7 @@ fn a_sweep_leaves_runs_tables_and_plots_and_runs_again_only_what_is_missing() {
     assert_eq!(when, written(&kept));
     assert_eq!(before, hashes(&here, "s"));
 
-    // A wider list keeps what is there; side by side on request.
+    // A longer list keeps existing cases; side-by-side recordings are made on request.
     let wider = small(&["--vary", "alpha=5/3,0,1", "--repeat-seeds", "2", "--out", "s"]);
     let said = here.grainscope(&wider).exits(0);
     assert!(said.err.contains("6 cases, 4 done before"), "{}", said.err);
@@ -98,9 +99,9 @@ fn a_sweep_leaves_runs_tables_and_plots_and_runs_again_only_what_is_missing() {
 }
 
 #[test]
-fn what_fails_stops_nothing_and_is_tried_again() {
+fn failed_cases_do_not_stop_a_sweep_and_are_run_again() {
     let here = TempFolder::new();
-    // Without a background nothing fills what the grains leave free; that is seen at the start.
+    // Without a background nothing fills the space outside the grains; a run fails at its start.
     let arguments = small(&[
         "--vary",
         "materials.background.background=false,true",
@@ -125,12 +126,12 @@ fn what_fails_stops_nothing_and_is_tried_again() {
 }
 
 #[test]
-fn bad_values_say_how_to_write_them() {
+fn invalid_values_are_refused_with_the_right_syntax() {
     let here = TempFolder::new();
     for (more, code, parts) in [
         (&["--vary", "alhpa=0,1"][..], 3, &["--vary alhpa=0", "did you mean `alpha`?"][..]),
-        (&["--vary", "alpha=0..1"], 2, &["says not how many values", "--sample sobol:64"]),
-        (&["--vary", "alpha=0..1:x"], 2, &["no count that can be read", "0..1:5"]),
+        (&["--vary", "alpha=0..1"], 2, &["has no number of values", "--sample sobol:64"]),
+        (&["--vary", "alpha=0..1:x"], 2, &["invalid count", "0..1:5"]),
         (&["--vary", "alpha=0,200"], 3, &["case alpha=200", "outside its range: 0 to 100"]),
         (&["--vary", "alpha"], 2, &["there is no `=`", "name=a,b,c"]),
         (&["--vary", "alpha=0..1", "--sample", "grid:3"], 2, &["sobol:N"]),
@@ -146,7 +147,7 @@ fn bad_values_say_how_to_write_them() {
 }
 
 #[test]
-fn a_dry_run_lists_cases_and_single_ones_can_be_run() {
+fn a_dry_run_lists_cases_and_single_cases_can_be_run() {
     let here = TempFolder::new();
     let sampled = small(&[
         "--vary",
@@ -167,7 +168,7 @@ fn a_dry_run_lists_cases_and_single_ones_can_be_run() {
     assert!(here.has(&format!("s/cases/{}/summary.json", listed[1])));
     here.grainscope(&["sweep", "list", "s"]).exits(0).prints(&["done", "missing"]);
     here.grainscope(&["sweep", "case", "s", "4"]).exits(2).complains(&["from 1 to 3"]);
-    // Twice is once.
+    // A finished case is not run again.
     let file = here.path(&format!("s/cases/{}/series.csv", listed[1]));
     let when = || file.metadata().and_then(|m| m.modified()).expect("a file");
     let before = when();
@@ -177,7 +178,7 @@ fn a_dry_run_lists_cases_and_single_ones_can_be_run() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_keeps_what_is_done_and_leaves_no_process() {
+fn an_interrupt_keeps_finished_cases_and_leaves_no_process() {
     let here = TempFolder::new();
     let arguments =
         ["sweep", "silo", "--vary", "accuracy.cells=2,16", "--out", "s", "--no-recordings"];
@@ -206,6 +207,7 @@ fn signal(name: &str, child: &Child) {
     Command::new("kill").args([name, &child.id().to_string()]).status().expect("a signal is sent");
 }
 
+/// Waits until a condition holds.
 #[track_caller]
 fn until(what: &str, mut is: impl FnMut() -> bool) {
     let start = Instant::now();
@@ -215,7 +217,7 @@ fn until(what: &str, mut is: impl FnMut() -> bool) {
     }
 }
 
-/// A Python with HyperQueue's package; `None`, said aloud, where there is none.
+/// A Python that has a module; prints a message and returns `None` if there is none.
 fn python_with(module: &str) -> Option<String> {
     let named = std::env::var("GRAINSCOPE_PYTHON").ok();
     let mut candidates = named.into_iter().chain(["python3".to_owned()]);
@@ -230,17 +232,18 @@ fn python_with(module: &str) -> Option<String> {
     found
 }
 
-/// A HyperQueue server or worker; ended with the test.
+/// A HyperQueue server or worker, killed at the end of the test.
 struct HyperQueue(Child);
 
 impl Drop for HyperQueue {
     fn drop(&mut self) {
-        // It may be gone already.
+        // It may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
+/// A HyperQueue cluster on this machine.
 struct Cluster<'a> {
     here: &'a TempFolder,
     python: String,
@@ -290,7 +293,7 @@ impl Cluster<'_> {
 }
 
 #[test]
-fn hyperqueue_gives_what_this_machine_gives() {
+fn hyperqueue_gives_the_same_states_as_local_runs() {
     let here = TempFolder::new();
     let entry = |value: &str| {
         let mut command = here.command(&small(&["--vary", "alpha=0,1", "--engine", "hq"]));
@@ -310,7 +313,7 @@ fn hyperqueue_gives_what_this_machine_gives() {
     assert_eq!(hashes(&here, "hq"), hashes(&here, "local"));
 }
 
-/// The long one: a worker dies while it works, a case fails, the server dies and is started again.
+/// Long test: a worker is killed during a case, and the server is killed and started again.
 #[cfg(unix)]
 #[test]
 #[ignore = "some minutes; needs the Python package hyperqueue"]
@@ -333,7 +336,7 @@ fn a_sweep_survives_the_death_of_workers_and_servers() {
         list.map_or(0, |l| l.filter_map(|e| is_run(e).then_some(())).count())
     };
     until("both workers run a case", || running() == 2);
-    // Killed outright, in the middle of a case.
+    // A worker is killed in the middle of a case.
     signal("-KILL", &workers.remove(0).0);
     let done = || {
         let list = std::fs::read_dir(here.path("hq/cases"));
@@ -341,7 +344,7 @@ fn a_sweep_survives_the_death_of_workers_and_servers() {
     };
     until("another case is done", || done() >= 3);
     signal("-KILL", &server.0);
-    // Nobody is left to wait for: the sweep says what is missing.
+    // Without a server the sweep ends and reports missing cases.
     assert_eq!(child.wait().expect("ends").code(), Some(6));
     let before = done();
     assert!((3..6).contains(&before), "{before} of 6 done");
@@ -366,7 +369,7 @@ fn recordings_are_exported_for_other_programs() {
     assert!(last > 1 && frames[0] == 0.0 && (frames[last] - 3e-4).abs() < 1e-9, "{frames:?}");
     let particles = Table::read(&here.read(&format!("t/particles_{last:05}.csv")));
     assert!(particles.text("material").iter().all(|m| ["grains", "marked"].contains(m)));
-    // What has left the silo is below the floor.
+    // Particles that have left the silo are below its bottom at y = 3.
     let below = |name: &str| {
         let table = Table::read(&here.read(name));
         table.numbers("y").iter().filter(|y| **y < 2.99).count()
@@ -416,7 +419,7 @@ fn recordings_are_exported_for_other_programs() {
 }
 
 #[test]
-fn what_cannot_be_exported_says_why() {
+fn export_errors_give_the_reason() {
     let here = TempFolder::new();
     here.grainscope(&["export", "none", "--format", "vtu"]).exits(1).complains(&["no such file"]);
     let run = ["run", "silo", "--set", "accuracy.cells=2", "--steps", "1", "--out", "r"];

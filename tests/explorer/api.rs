@@ -1,4 +1,4 @@
-//! Commands and their answers, and who is refused.
+//! Tests of commands and answers over HTTP, and of refused requests.
 
 use super::http::request;
 use super::{Explorer, PATIENCE, program};
@@ -7,20 +7,21 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// A silo that takes some milliseconds a step.
+/// A silo that takes some milliseconds per step.
 const SMALL: [&str; 4] = ["silo", "--set", "accuracy.cells=2", "--paused"];
 
+/// Command that sets a key.
 fn set(key: &str, value: &str) -> Value {
     json!({ "do": "set", "key": key, "value": value })
 }
 
 #[test]
-fn changes_on_the_way_are_repeated_to_the_bit() {
+fn changes_between_steps_are_reproduced_bit_for_bit() {
     let explorer = Explorer::open(&SMALL);
     explorer.steps(3);
     assert!(explorer.set("alpha", "2").ends_with("takes effect with step 4"));
     explorer.steps(1);
-    // Several changes between two steps, one of them taken back.
+    // Several changes between two steps; one of them is overridden.
     explorer.set("gravity[1]", "-30");
     explorer.set("contrast", "100");
     explorer.set("gravity[1]", "-5");
@@ -36,16 +37,16 @@ fn changes_on_the_way_are_repeated_to_the_bit() {
     explorer.repeats_headless("kept");
     let scene = std::fs::read_to_string(explorer.path("runs/kept/scene.toml")).expect("a scene");
     assert_eq!(scene.matches("[[schedule]]").count(), 4, "{scene}");
-    // Not noticed if the last change waits for a step that is not taken.
+    // A change that waits for a step that is not taken has no effect on the saved run.
     explorer.set("alpha", "0.01");
     explorer.repeats_headless("waiting");
-    // And on from there.
+    // The waiting change takes effect with the next step.
     explorer.steps(1);
     explorer.repeats_headless("after");
 }
 
 #[test]
-fn changes_while_running_are_repeated_to_the_bit() {
+fn changes_while_running_are_reproduced_bit_for_bit() {
     let explorer = Explorer::open(&["silo", "--set", "accuracy.cells=2"]);
     for (step, alpha) in [(3, "1"), (6, "10"), (9, "0.1")] {
         explorer.wait_for("step", |s| s["run"]["step"].as_u64() >= Some(step));
@@ -56,8 +57,8 @@ fn changes_while_running_are_repeated_to_the_bit() {
 }
 
 #[test]
-fn other_scenes_repeat_too() {
-    // Directors; a stable stratification, in which gravity sets how long steps may be.
+fn changes_of_other_scenes_are_reproduced() {
+    // A scene with directors, and stratified scenes, in which gravity limits the step.
     for (scene, key, values) in [
         ("shear_alignment", "materials.layers.layer_viscosity", ["0.05", "0.2"]),
         ("rayleigh_taylor", "gravity[1]", ["-20", "5"]),
@@ -78,7 +79,7 @@ fn other_scenes_repeat_too() {
 }
 
 #[test]
-fn a_change_comes_between_those_of_the_scene_itself() {
+fn changes_are_ordered_among_scheduled_ones() {
     let silo = program().args(["presets", "show", "silo"]).output().expect("starts");
     let silo = String::from_utf8(silo.stdout).expect("text");
     let scene = format!(
@@ -104,7 +105,7 @@ fn a_change_comes_between_those_of_the_scene_itself() {
 }
 
 #[test]
-fn what_a_change_does_is_said_before_and_when_it_is_made() {
+fn the_effect_of_a_change_is_stated_before_and_after() {
     let explorer = Explorer::open(&SMALL);
     explorer.steps(2);
     for (key, value, says) in [
@@ -112,16 +113,16 @@ fn what_a_change_does_is_said_before_and_when_it_is_made() {
         ("alpha", "0", "restarts: it changes the set of solved effects"),
         ("accuracy.cells", "3", "restarts: it changes the mesh"),
         ("aperture", "1.1", "restarts: it changes the mesh"),
-        ("fill_height", "6", "restarts: it changes what fills the domain at first"),
+        ("fill_height", "6", "restarts: it changes the initial regions"),
         ("accuracy.tolerance", "1e-8", "restarts: it changes the accuracy"),
-        ("time.end", "5e-3", "restarts: it changes times of the run"),
+        ("time.end", "5e-3", "restarts: it changes the times of the run"),
         ("boundaries.top.kind", "open", "restarts: it changes the boundaries"),
     ] {
         let answer = explorer.ask(json!({ "do": "ask", "key": key, "value": value }));
         assert_eq!(answer["message"], json!(says), "{key}");
         assert_eq!(answer["restarts"], json!(says.starts_with("restarts")), "{key}");
     }
-    assert_eq!(explorer.state()["run"]["step"], json!(2), "asking changes nothing");
+    assert_eq!(explorer.state()["run"]["step"], json!(2), "a question changed the run");
     for (key, value, says) in [
         ("alpha", "-1", "min"),
         ("alpha", "much", "unknown name"),
@@ -136,7 +137,7 @@ fn what_a_change_does_is_said_before_and_when_it_is_made() {
         assert!(all.contains(says), "{key}: {all}");
         assert!(answer["remedy"].is_string(), "{key}: {all}");
     }
-    assert_eq!(explorer.state()["run"]["step"], json!(2), "what is refused changes nothing");
+    assert_eq!(explorer.state()["run"]["step"], json!(2), "a refused command changed the run");
     let said = explorer.set("alpha", "0");
     assert_eq!(said, "alpha = 0; restarted: it changes the set of solved effects");
     let state = explorer.state();
@@ -145,7 +146,7 @@ fn what_a_change_does_is_said_before_and_when_it_is_made() {
     let rotation = state["effects"].as_array().expect("a list").iter();
     let rotation = rotation.clone().find(|e| e["name"] == json!("Cosserat rotation"));
     assert_eq!(rotation.expect("told")["solved"], json!(false));
-    // The way back: what the switch offers.
+    // The switch offers the previous value.
     let switch = state["switches"][0].clone();
     assert_eq!((&switch["key"], &switch["on"]), (&json!("alpha"), &json!(false)));
     explorer.set("alpha", switch["other"].as_str().expect("text"));
@@ -164,7 +165,7 @@ fn more_internal_length_slows_the_discharge() {
 }
 
 #[test]
-fn transport() {
+fn run_pause_step_stop_and_restart() {
     let explorer = Explorer::open(&SMALL);
     assert_eq!(explorer.state()["mode"], json!("paused"));
     assert_eq!(explorer.tell(json!({ "do": "step" })), "step 1");
@@ -173,7 +174,7 @@ fn transport() {
     explorer.tell(json!({ "do": "pause" }));
     let step = explorer.state()["run"]["step"].clone();
     std::thread::sleep(Duration::from_millis(300));
-    assert_eq!(explorer.state()["run"]["step"], step, "a run that stands stands");
+    assert_eq!(explorer.state()["run"]["step"], step, "a paused run took steps");
     explorer.tell(json!({ "do": "stop" }));
     assert_eq!(explorer.state()["mode"], json!("stopped"));
     assert_eq!(explorer.ask(json!({ "do": "step" }))["accepted"], json!(false));
@@ -184,7 +185,7 @@ fn transport() {
 }
 
 #[test]
-fn pins_keep_what_was() {
+fn pins_keep_earlier_runs() {
     let explorer = Explorer::open(&SMALL);
     explorer.steps(3);
     explorer.tell(json!({ "do": "pin", "name": "soft" }));
@@ -193,7 +194,7 @@ fn pins_keep_what_was() {
     let before = explorer.state()["stream"].clone();
     explorer.set("alpha", "0");
     let state = explorer.state();
-    assert_ne!(state["stream"], before, "another recording");
+    assert_ne!(state["stream"], before, "the recording is the same");
     let pin = state["pins"][0].clone();
     assert_eq!((&pin["name"], &pin["steps"]), (&json!("soft"), &json!(3)));
     let curves = explorer.get(&format!("api/curves?run={}&from=1", pin["id"])).json();
@@ -259,7 +260,7 @@ fn strangers_are_refused() {
         let path = if path.starts_with('/') { path.to_string() } else { format!("/{path}") };
         assert_eq!(code(&path, &[]), 403, "{path}");
     }
-    // Names that others resolve to this machine, and pages of other sites.
+    // Foreign host names that may resolve to this machine, and origins of other sites.
     for host in ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1.evil.example", ""] {
         assert_eq!(code(&state, &[("Host", host)]), 403, "{host}");
     }
@@ -277,11 +278,11 @@ fn strangers_are_refused() {
     assert_eq!(post(&[json], b"{"), 400);
     assert_eq!(post(&[json], br#"{"do":"exec","path":"/bin/sh"}"#), 400);
     assert_eq!(post(&[json], &vec![b' '; 1 << 20]), 413);
-    assert_eq!(explorer.state()["mode"], json!("paused"), "nothing of this was heard");
+    assert_eq!(explorer.state()["mode"], json!("paused"), "a refused command changed the run");
     let long = "x".repeat(1 << 20);
     let refused = code(&state, &[("X-Long", &long)]);
     assert!(refused == 431 || refused == 400 || refused == 0, "{refused}");
-    assert_eq!(code(&page, &[]), 200, "and it still serves");
+    assert_eq!(code(&page, &[]), 200, "the server no longer answers");
     let head = request(port, "GET", &page, &[], b"").head.to_ascii_lowercase();
     for header in ["content-security-policy: default-src 'none'", "x-content-type-options: nosniff"]
     {
@@ -289,7 +290,7 @@ fn strangers_are_refused() {
     }
 }
 
-/// Who begins to say something and does not go on is cut off, and holds nobody up.
+/// Clients that send an incomplete request are disconnected and do not block others.
 #[test]
 fn clients_that_take_too_long_are_cut_off() {
     let explorer = Explorer::open(&SMALL);
@@ -308,10 +309,10 @@ fn clients_that_take_too_long_are_cut_off() {
             stream
         })
         .collect();
-    assert_eq!(request(port, "GET", &page, &[], b"").code, 200, "nobody is held up");
+    assert_eq!(request(port, "GET", &page, &[], b"").code, 200, "slow clients block others");
     for mut stream in slow {
         let mut answer = Vec::new();
-        // It ends, with or without a word, long before this side's patience.
+        // The server closes the connection, with or without an answer, before the timeout.
         stream.read_to_end(&mut answer).expect("an end");
         let answer = String::from_utf8_lossy(&answer);
         assert!(answer.is_empty() || answer.contains(" 408 "), "{answer}");
@@ -319,7 +320,7 @@ fn clients_that_take_too_long_are_cut_off() {
 }
 
 #[test]
-fn a_scene_with_errors_says_where_and_leaves_the_run() {
+fn errors_of_a_scene_are_located_and_the_run_is_kept() {
     let explorer = Explorer::beside(
         &[
             ("broken.toml", "schema = 1\nname = \"broken\"\ngravty = [0, -10]\n"),
@@ -339,7 +340,7 @@ fn a_scene_with_errors_says_where_and_leaves_the_run() {
     assert_eq!(fault["line"], json!([3, "gravty = [0, -10]"]));
     assert!(fault["remedy"].as_str().expect("text").contains("gravity"), "{fault}");
     assert_eq!((&state["title"], &state["run"]["step"]), (&json!("silo"), &json!(1)));
-    // It may be mended and tried again; what is right takes its place.
+    // After a correction the scene can be loaded.
     let scene = program().args(["presets", "show", "solcx"]).output().expect("starts").stdout;
     std::fs::write(explorer.path("broken.toml"), scene).expect("written");
     explorer.tell(json!({ "do": "load", "scene": "file:broken.toml" }));
@@ -348,7 +349,7 @@ fn a_scene_with_errors_says_where_and_leaves_the_run() {
 }
 
 #[test]
-fn opens_with_a_broken_scene_and_without_any_run() {
+fn starts_with_an_invalid_scene_and_without_a_run() {
     let broken = [("broken.toml", "schema = 1\nname = 3\n")];
     let explorer = Explorer::beside(&broken, &["broken.toml"]);
     let state = explorer.state();

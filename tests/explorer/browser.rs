@@ -1,17 +1,18 @@
-//! The page in a real browser, as a newcomer meets it.
+//! Tests of the page in a browser.
 
 use super::Explorer;
 use super::webdriver::{Browser, ENTER, RIGHT, TAB};
 use serde_json::json;
 use std::path::Path;
 
-/// Long enough for browsers that draw without a graphics card.
+/// A run long enough for browsers that render without a graphics card.
 const SMALL: [&str; 6] = ["silo", "--set", "accuracy.cells=2", "--set", "time.end=1", "--paused"];
-/// The grains, and the paper they are drawn on.
+/// Colour of the grains.
 const GRAINS: [u8; 3] = [230, 159, 0];
+/// JavaScript expression of the step that the page shows.
 const STEP: &str = "Number(document.querySelector('#numbers dd').textContent)";
 
-/// Rate of outflow as the page shows it.
+/// Outflow rate that the page shows.
 fn rate(browser: &Browser) -> f64 {
     let text = browser.text("#numbers");
     let after = text.split("outflow rate").nth(1).expect("a rate");
@@ -19,13 +20,14 @@ fn rate(browser: &Browser) -> f64 {
     number.parse().unwrap_or_else(|_| panic!("{number} in {text}"))
 }
 
+/// Replaces the text of an input element.
 fn type_into(browser: &Browser, css: &str, text: &str) {
     let field = browser.find(css);
     field.clear();
     field.write(text);
 }
 
-/// Waits until the viewer shows the recording that the session speaks of.
+/// Waits until the viewer shows the current recording of the session.
 fn viewer_shows(browser: &Browser) {
     browser.wait_for(
         "picture",
@@ -34,13 +36,13 @@ fn viewer_shows(browser: &Browser) {
 }
 
 #[test]
-fn a_newcomer_in_five_minutes() {
+fn a_first_session() {
     let Some(browser) = Browser::start([1280, 720], false) else { return };
     let broken = "schema = 1\nname = \"broken\"\ngravty = [0, -10]\n";
     let explorer = Explorer::beside(&[("broken.toml", broken)], &SMALL);
     browser.go(&explorer.url);
 
-    // A sketch at first; two steps by the keyboard.
+    // The page shows a sketch first; two steps are taken with the keyboard.
     browser.wait_for("sketch", "sketched !== null || document.body.dataset.showing");
     browser.wait_for("knobs", "state.knobs.length > 0");
     for step in 1..=2 {
@@ -48,7 +50,8 @@ fn a_newcomer_in_five_minutes() {
         browser.wait_for("step", &format!("{STEP} === {step}"));
     }
 
-    // More internal length, less outflow: said first, then done.
+    // A larger internal length reduces the outflow. The page states the effect of the change before
+    // it is made.
     let before = rate(&browser);
     type_into(&browser, "#knob-alpha", "2");
     browser.wait_for(
@@ -62,7 +65,7 @@ fn a_newcomer_in_five_minutes() {
     let after = rate(&browser);
     assert!(after < 0.97 * before, "{before} {after}");
 
-    // It runs, and stands when told to; the viewer draws the flow.
+    // The run starts and pauses; the viewer draws the flow.
     browser.script("document.activeElement.blur()", &[]);
     browser.press(" ");
     browser.wait_for("sixth step", &format!("{STEP} >= 6"));
@@ -79,7 +82,7 @@ fn a_newcomer_in_five_minutes() {
         assert!(clock.elapsed() < super::PATIENCE, "{colours} colours, {shares:?} grains");
     }
 
-    // Keep it, and leave the rotation out: that is another run, beside the first.
+    // The run is pinned. Switching rotation off starts a second run beside it.
     type_into(&browser, "#pin-name", "stiff");
     browser.find("#pin button").click();
     browser.wait_for("pin", "state.pins.length === 1");
@@ -95,7 +98,7 @@ fn a_newcomer_in_five_minutes() {
         "document.querySelectorAll('#plots .plot:first-child path.curve').length === 2",
     );
 
-    // A scene with errors says so, where, and what to do; the run is still there.
+    // A scene with errors shows their location and a remedy; the run is kept.
     browser.script(
         "const s = document.getElementById('scene'); s.value = 'file:broken.toml'; s.onchange({ target: s })",
         &[],
@@ -107,7 +110,7 @@ fn a_newcomer_in_five_minutes() {
     }
     assert_eq!(explorer.state()["title"], json!("silo"));
 
-    // Another scene takes its place.
+    // Another scene is loaded.
     browser.script(
         "const s = document.getElementById('scene'); s.value = 'preset:layer_stack'; s.onchange({ target: s })",
         &[],
@@ -118,7 +121,7 @@ fn a_newcomer_in_five_minutes() {
     );
     viewer_shows(&browser);
 
-    // Back to the silo; leave with a scene that reproduces it.
+    // The silo is loaded again and saved with a scene that reproduces it.
     browser.script(
         "const s = document.getElementById('scene'); s.value = 'preset:silo'; s.onchange({ target: s })",
         &[],
@@ -137,7 +140,7 @@ fn a_newcomer_in_five_minutes() {
 }
 
 #[test]
-fn two_tabs_show_the_same_and_may_be_closed() {
+fn two_tabs_show_the_same_run_and_can_be_closed() {
     let Some(browser) = Browser::start([1280, 720], false) else { return };
     let explorer = Explorer::open(&["silo", "--set", "accuracy.cells=2", "--paused"]);
     browser.go(&explorer.url);
@@ -161,7 +164,7 @@ fn two_tabs_show_the_same_and_may_be_closed() {
 }
 
 #[test]
-fn controls_have_names_room_and_keys() {
+fn controls_have_names_fit_and_work_by_keyboard() {
     for (size, dark) in [([1280, 720], false), ([1920, 1080], true)] {
         let Some(browser) = Browser::start(size, dark) else { return };
         let explorer = Explorer::open(&["silo", "--set", "accuracy.cells=2", "--paused"]);
@@ -185,7 +188,7 @@ fn controls_have_names_room_and_keys() {
         assert_eq!(wide, json!([true, true, []]));
         let scheme = "matchMedia('(prefers-color-scheme: dark)').matches";
         assert_eq!(browser.script(&format!("return {scheme}"), &[]), json!(dark));
-        // Every control can be reached, and turned, by keys.
+        // Every control can be reached and changed with the keyboard.
         let reached = (0..60)
             .map(|_| {
                 browser.press(TAB);
@@ -211,7 +214,7 @@ fn pictures() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/explorer/pictures");
     std::fs::create_dir_all(&folder).expect("a folder");
     let save = |browser: &Browser, name: &str| {
-        // Software rendering takes its time, and lags far behind the run meanwhile.
+        // Software rendering is slow and lags far behind the run.
         std::thread::sleep(std::time::Duration::from_secs(100));
         std::fs::write(folder.join(name), browser.picture()).expect("a file");
     };

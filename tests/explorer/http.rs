@@ -1,22 +1,27 @@
-//! As little of a client as the tests need: one request, one connection, every header as given.
+//! A minimal HTTP client for the tests: one request per connection, headers as given.
 
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
-/// What a server answered.
+/// Response of a server.
 pub struct Reply {
+    /// Status code; 0 without a valid response.
     pub code: u16,
+    /// Status line and headers.
     pub head: String,
+    /// Body, with chunks joined.
     pub body: Vec<u8>,
 }
 
 impl Reply {
+    /// The body as text.
     pub fn text(&self) -> String {
         String::from_utf8_lossy(&self.body).into_owned()
     }
 
+    /// The body as JSON.
     #[track_caller]
     pub fn json(&self) -> Value {
         serde_json::from_slice(&self.body)
@@ -24,7 +29,7 @@ impl Reply {
     }
 }
 
-/// Sends a request to this machine; `Host` is the usual one unless given.
+/// Sends a request to a port of this machine. The header `Host` is added unless given.
 pub fn request(
     port: u16,
     method: &str,
@@ -45,7 +50,7 @@ pub fn request(
     let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("a server");
     stream.set_read_timeout(Some(Duration::from_secs(240))).expect("a timeout");
     stream.write_all(format!("{head}\r\n").as_bytes()).expect("sent");
-    // A server may refuse before it has read everything.
+    // A server may refuse a request before it has read the body.
     let _ = stream.write_all(body);
     // Not every server closes the connection when asked to.
     let (mut bytes, mut part) = (vec![], [0; 1 << 16]);
@@ -58,11 +63,13 @@ pub fn request(
     read(&bytes)
 }
 
+/// Length of the head with its final blank line, and its text.
 fn head_of(bytes: &[u8]) -> Option<(usize, String)> {
     let end = bytes.windows(4).position(|w| w == b"\r\n\r\n")?;
     Some((end + 4, String::from_utf8_lossy(&bytes[..end]).into_owned()))
 }
 
+/// True if the response is complete.
 fn is_whole(bytes: &[u8]) -> bool {
     let Some((from, head)) = head_of(bytes) else { return false };
     let head = head.to_ascii_lowercase();
@@ -74,6 +81,7 @@ fn is_whole(bytes: &[u8]) -> bool {
     }
 }
 
+/// Parses a response.
 fn read(bytes: &[u8]) -> Reply {
     let (from, head) = head_of(bytes).unwrap_or((bytes.len(), String::new()));
     let code = head.split(' ').nth(1).and_then(|c| c.parse().ok()).unwrap_or(0);
@@ -84,7 +92,7 @@ fn read(bytes: &[u8]) -> Reply {
     Reply { code, head, body }
 }
 
-/// The body of chunks.
+/// Joins the chunks of a chunked body.
 fn joined(mut rest: &[u8]) -> Vec<u8> {
     let mut out = vec![];
     while let Some(end) = rest.windows(2).position(|w| w == b"\r\n") {

@@ -1,4 +1,4 @@
-//! The explorer as pages meet it: over HTTP, and in a real browser where there is one.
+//! Tests of the explorer over HTTP, and in a browser if one is installed.
 
 mod api;
 mod browser;
@@ -13,10 +13,10 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// How long anything may take; machines of tests are slow.
+/// Longest time to wait for anything; test machines may be slow.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// An explorer in a folder of its own; both are gone when this is.
+/// An explorer running in a temporary folder; both are removed when dropped.
 struct Explorer {
     folder: TempFolder,
     child: Child,
@@ -31,11 +31,12 @@ impl Drop for Explorer {
 }
 
 impl Explorer {
+    /// Starts an explorer.
     fn open(arguments: &[&str]) -> Explorer {
         Self::beside(&[], arguments)
     }
 
-    /// Opens with files in its folder.
+    /// Starts an explorer with files in its folder.
     fn beside(files: &[(&str, &str)], arguments: &[&str]) -> Explorer {
         let folder = TempFolder::new().expect("a folder");
         for (name, text) in files {
@@ -59,31 +60,34 @@ impl Explorer {
         explorer
     }
 
+    /// Path of a file in the folder.
     fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Port of the page.
+    /// Port of the server.
     fn port(&self) -> u16 {
         let rest = self.url.trim_start_matches("http://127.0.0.1:");
         rest.split('/').next().and_then(|p| p.parse().ok()).expect("a port")
     }
 
-    /// `/<token>/` and what comes below it.
+    /// The URL path `/<token>/` followed by `path`.
     fn below(&self, path: &str) -> String {
         let token = self.url.trim_end_matches('/').rsplit('/').next().expect("a token");
         format!("/{token}/{path}")
     }
 
+    /// Sends a GET request.
     fn get(&self, path: &str) -> Reply {
         http::request(self.port(), "GET", &self.below(path), &[], b"")
     }
 
+    /// State of the session.
     fn state(&self) -> Value {
         self.get("api/state").json()
     }
 
-    /// What is answered to a command.
+    /// Sends a command and returns the answer.
     fn ask(&self, command: Value) -> Value {
         let body = command.to_string();
         let kind = [("Content-Type", "application/json")];
@@ -91,6 +95,7 @@ impl Explorer {
             .json()
     }
 
+    /// Sends a command that must be accepted, and returns the message.
     #[track_caller]
     fn tell(&self, command: Value) -> String {
         let answer = self.ask(command.clone());
@@ -98,17 +103,20 @@ impl Explorer {
         answer["message"].as_str().expect("a message").into()
     }
 
+    /// Sets a key of the scene, and returns the message.
     #[track_caller]
     fn set(&self, key: &str, value: &str) -> String {
         self.tell(json!({ "do": "set", "key": key, "value": value }))
     }
 
+    /// Takes `n` steps.
     fn steps(&self, n: usize) {
         for _ in 0..n {
             self.tell(json!({ "do": "step" }));
         }
     }
 
+    /// Waits until the state satisfies a condition, and returns the state.
     #[track_caller]
     fn wait_for(&self, what: &str, done: impl Fn(&Value) -> bool) -> Value {
         let clock = Instant::now();
@@ -127,7 +135,7 @@ impl Explorer {
         program().args(arguments).current_dir(self.folder.path()).output().expect("starts")
     }
 
-    /// Saves, repeats what was saved without the explorer, and compares the states.
+    /// Saves the run, repeats it without the explorer, and compares the final states.
     #[track_caller]
     fn repeats_headless(&self, name: &str) {
         self.tell(json!({ "do": "save", "name": name }));

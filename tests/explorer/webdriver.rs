@@ -1,4 +1,4 @@
-//! A browser driven over WebDriver: chromedriver and Chromium, where the machine has them.
+//! Controls a browser over WebDriver, if chromedriver and Chromium are installed.
 
 use super::http;
 use super::{PATIENCE, TempFolder};
@@ -7,14 +7,17 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Key under which WebDriver names elements.
+/// JSON key of element ids in WebDriver.
 const ELEMENT: &str = "element-6066-11e4-a52e-4f735466cecf";
 
-/// Keys that are not letters.
+/// WebDriver code of the Enter key.
 pub const ENTER: &str = "\u{e007}";
+/// WebDriver code of the Tab key.
 pub const TAB: &str = "\u{e004}";
+/// WebDriver code of the right arrow key.
 pub const RIGHT: &str = "\u{e014}";
 
+/// A browser session.
 pub struct Browser {
     driver: Child,
     port: u16,
@@ -30,14 +33,15 @@ impl Drop for Browser {
     }
 }
 
-/// A page, or a part of one.
+/// An element of a page.
 pub struct Element<'a> {
     browser: &'a Browser,
     id: String,
 }
 
 impl Browser {
-    /// `None` where there is no browser, which is said.
+    /// Starts a browser with a page of the given size; prints a message and returns `None` if that
+    /// is impossible.
     pub fn start([width, height]: [u32; 2], dark: bool) -> Option<Browser> {
         let skipped = |why: &str| {
             eprintln!("SKIPPED: {why}; install chromium and chromium-driver to test the page");
@@ -80,10 +84,10 @@ impl Browser {
             return skipped(&format!("no browser can be started: {}", reply.text()));
         };
         let browser = Browser { driver, port, session, _profile: profile };
-        // Drawing without a graphics card holds scripts up.
+        // Rendering without a graphics card delays scripts.
         let most = PATIENCE.as_millis() as u64;
         browser.command("POST", "/timeouts", json!({ "script": most, "pageLoad": most }));
-        // The window's frame takes room, the page is to have all that was asked for.
+        // The window is enlarged by its frame, so that the page has the requested size.
         let size = browser.script("return [innerWidth, innerHeight]", &[]);
         let lack = |k: usize, wanted: u32| {
             u64::from(wanted) - size[k].as_u64().unwrap_or(0).min(u64::from(wanted))
@@ -94,6 +98,7 @@ impl Browser {
         Some(browser)
     }
 
+    /// Sends a WebDriver command, and returns the value.
     #[track_caller]
     fn command(&self, method: &str, path: &str, body: Value) -> Value {
         let path = format!("/session/{}{path}", self.session);
@@ -104,22 +109,24 @@ impl Browser {
         value
     }
 
+    /// Opens a URL.
     pub fn go(&self, url: &str) {
         self.command("POST", "/url", json!({ "url": url }));
     }
 
-    /// The value of a script in the page.
+    /// Runs a script in the page, and returns its value.
     #[track_caller]
     pub fn script(&self, script: &str, arguments: &[Value]) -> Value {
         self.command("POST", "/execute/sync", json!({ "script": script, "args": arguments }))
     }
 
-    /// The same for one that answers later, through its last argument.
+    /// Runs a script that returns its value by calling its last argument.
     #[track_caller]
     pub fn later(&self, script: &str, arguments: &[Value]) -> Value {
         self.command("POST", "/execute/async", json!({ "script": script, "args": arguments }))
     }
 
+    /// The first element that matches a CSS selector.
     #[track_caller]
     pub fn find(&self, css: &str) -> Element<'_> {
         let found =
@@ -128,7 +135,7 @@ impl Browser {
         Element { browser: self, id }
     }
 
-    /// Types into whatever has the focus.
+    /// Types into the element that has the focus.
     pub fn press(&self, keys: &str) {
         let actions: Vec<Value> = keys
             .chars()
@@ -140,11 +147,13 @@ impl Browser {
         self.command("POST", "/actions", body);
     }
 
+    /// Visible text of an element; empty if there is none.
     pub fn text(&self, css: &str) -> String {
         let script = "const e = document.querySelector(arguments[0]); return e ? e.innerText : ''";
         self.script(script, &[json!(css)]).as_str().unwrap_or_default().into()
     }
 
+    /// Waits until a JavaScript condition holds, and returns its value.
     #[track_caller]
     pub fn wait_for(&self, what: &str, condition: &str) -> Value {
         let clock = Instant::now();
@@ -162,7 +171,7 @@ impl Browser {
         }
     }
 
-    /// Opens a page in a window of its own, and goes there.
+    /// Opens a page in a new tab, switches to it, and returns its handle.
     pub fn open_window(&self, url: &str) -> String {
         let window = self.command("POST", "/window/new", json!({ "type": "tab" }));
         let handle = window["handle"].as_str().expect("a window").to_string();
@@ -171,25 +180,28 @@ impl Browser {
         handle
     }
 
+    /// Handle of the current window.
     pub fn window(&self) -> String {
         self.command("GET", "/window", json!({})).as_str().expect("a window").into()
     }
 
+    /// Switches to a window.
     pub fn switch(&self, window: &str) {
         self.command("POST", "/window", json!({ "handle": window }));
     }
 
+    /// Closes the current window.
     pub fn close_window(&self) {
         self.command("DELETE", "/window", json!({}));
     }
 
-    /// The page as PNG.
+    /// Screenshot of the page as PNG.
     pub fn picture(&self) -> Vec<u8> {
         decoded(self.command("GET", "/screenshot", json!({})).as_str().unwrap_or_default())
     }
 
-    /// Share of the pixels of an element that look like each of some colours, within a tenth, and
-    /// how many colours there are at all.
+    /// Number of different colours of an element, and the shares of its pixels that are within a
+    /// tenth of each wanted colour.
     pub fn colours(&self, css: &str, wanted: &[[u8; 3]]) -> (usize, Vec<f64>) {
         let path = format!("/element/{}/screenshot", self.find(css).id);
         let png = self.command("GET", &path, json!({}));
@@ -217,16 +229,19 @@ impl Browser {
 }
 
 impl Element<'_> {
+    /// Clicks the element.
     #[track_caller]
     pub fn click(&self) {
         self.browser.command("POST", &format!("/element/{}/click", self.id), json!({}));
     }
 
+    /// Clears the text of an input element.
     #[track_caller]
     pub fn clear(&self) {
         self.browser.command("POST", &format!("/element/{}/clear", self.id), json!({}));
     }
 
+    /// Types text into the element.
     #[track_caller]
     pub fn write(&self, text: &str) {
         let path = format!("/element/{}/value", self.id);
@@ -234,6 +249,7 @@ impl Element<'_> {
     }
 }
 
+/// Decodes base64.
 fn decoded(base64: &str) -> Vec<u8> {
     let digit = |c: u8| match c {
         b'A'..=b'Z' => c - b'A',

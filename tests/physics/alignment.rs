@@ -1,7 +1,7 @@
-//! Shear alignment against an accurate one-dimensional solution.
+//! Compares shear alignment with an accurate one-dimensional solution.
 //!
-//! In a layer sheared along x everything depends on y alone. Uniformly random directors after a
-//! local shear `g` have a mean viscosity in closed form, so with `g,t = u'`
+//! In a layer sheared along x all fields depend only on y. The mean viscosity of uniformly random
+//! directors after a local shear `g` has a closed form, so with `g,t = u'`
 //!
 //! ```text
 //! (eta_m(g) + eta_c) u' + 2 eta_c w = tau
@@ -12,6 +12,7 @@
 use crate::{finish, preset};
 use grainscope::sim::Run;
 
+/// The one-dimensional layer; SI units.
 struct Layer {
     eta: f64,
     eta_s: f64,
@@ -19,7 +20,7 @@ struct Layer {
     m: f64,
     tau: f64,
     height: f64,
-    /// Shear at the grid's points.
+    /// Shear at the grid points.
     shear: Vec<f64>,
 }
 
@@ -29,12 +30,12 @@ impl Layer {
         self.eta - 0.5 * (self.eta - self.eta_s) * (1.0 + q * (q - 4.0) / (q + 4.0).powi(2))
     }
 
-    /// Rotation and shear rate for given shears: a tridiagonal system (Thomas).
+    /// Rotation and shear rate for given shears, from a tridiagonal system (Thomas algorithm).
     fn solve(&self, shear: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let n = shear.len();
         let h = self.height / (n - 1) as f64;
         let stiffness: Vec<f64> = shear.iter().map(|&g| self.viscosity(g) + self.eta_c).collect();
-        // u' = (tau - 2 eta_c w)/stiffness, into the balance of couples.
+        // u' = (tau - 2 eta_c w)/stiffness is inserted into the balance of couples.
         let k = self.m / (h * h);
         let mut c = vec![0.0; n];
         let mut w = vec![0.0; n];
@@ -52,7 +53,7 @@ impl Layer {
         (w, rate)
     }
 
-    /// One step of the classical Runge-Kutta rule.
+    /// One step of the classical Runge-Kutta method.
     fn step(&mut self, dt: f64) {
         let ahead = |rate: &[f64], f: f64| -> Vec<f64> {
             self.shear.iter().zip(rate).map(|(g, r)| g + f * r).collect()
@@ -80,8 +81,8 @@ fn alignment(g: f64) -> f64 {
         .sum()
 }
 
-/// Half the height of a band: one row of cells on either side of a mesh line, since directors
-/// are stratified cell by cell.
+/// Half the height of a band: one row of cells on either side of a mesh line, since directors are
+/// stratified in each cell.
 const HALF_BAND: f64 = 1.0 / 16.0;
 
 /// Mean |n_x| of the particles in a band around a height.
@@ -99,7 +100,7 @@ fn measured_alignment(run: &dyn Run, y: f64) -> f64 {
 }
 
 #[test]
-fn closed_form_of_the_table() {
+fn mean_alignment_has_tabulated_values() {
     for (g, expected) in
         [(0.0, std::f64::consts::FRAC_2_PI), (1.0, 0.56512), (4.0, 0.26860), (16.0, 0.06822)]
     {
@@ -140,7 +141,7 @@ fn the_layer_follows_the_one_dimensional_solution() {
         assert!((measured / top - 1.0).abs() < 0.01, "t = {target}: {measured} {top}");
         for i in [50, 100, 200, 300, 350] {
             let y = i as f64 / (n - 1) as f64;
-            // Mean over the period: a cell's random directors differ from the mean a little.
+            // Mean over the period, because the random directors of a cell differ from the mean.
             let mean: f64 =
                 (0..20).map(|k| run.velocity_at([-0.25 + 0.025 * k as f64, y])[2] / 20.0).sum();
             assert!((mean / w[i] - 1.0).abs() < 0.01, "t = {target}, y = {y}: {mean} {}", w[i]);
@@ -163,7 +164,7 @@ fn without_internal_length_the_shear_has_a_closed_form() {
     let sets = ["internal_length=0", "accuracy.cells=8", "time.end=0.5", "domain.x=[-0.25, 0.25]"];
     let mut run = preset("shear_alignment", &sets);
     assert!(!run.plan().effects.rotation);
-    // 750 times the rate at first: sum of 1000 and 500 over two.
+    // The initial mean viscosity is 750, the mean of 1000 and 500.
     let speed = |run: &dyn Run| {
         let mean = |y: f64| -> f64 {
             (0..20).map(|k| run.velocity_at([-0.25 + 0.025 * k as f64, y])[0] / 20.0).sum()
@@ -172,7 +173,7 @@ fn without_internal_length_the_shear_has_a_closed_form() {
     };
     let first = 1e4 / speed(run.as_ref());
     assert!((first / 750.0 - 1.0).abs() < 0.01, "{first}");
-    // No normal stress: nothing flows across.
+    // There is no normal stress, so there is no flow across the layer.
     assert!(run.velocity_at([0.03, 0.47])[1].abs() < 0.02 * speed(run.as_ref()));
     finish(run.as_mut(), |_| {});
     let (mut low, mut high) = (0.0, 100.0);
@@ -185,5 +186,5 @@ fn without_internal_length_the_shear_has_a_closed_form() {
     let eta = 1000.0 - 250.0 * (1.0 + q * (q - 4.0) / (q + 4.0f64).powi(2));
     let measured = speed(run.as_ref());
     assert!((measured / (1e4 / eta) - 1.0).abs() < 0.01, "{measured} {}", 1e4 / eta);
-    assert!((run.row().alignment.unwrap() - alignment(low)).abs() < 0.01);
+    assert!((run.row().mean_alignment.unwrap() - alignment(low)).abs() < 0.01);
 }

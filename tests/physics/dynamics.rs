@@ -1,9 +1,10 @@
-//! Whole runs: balances, symmetry, rest, and the source's claims on the silo.
+//! Tests of whole runs: balances, symmetry, rest, and the results of the source on the silo.
 
 use crate::{finish, preset, scene};
 use grainscope::sim::Run;
 
-/// Energy lost by the particles plus work of other loads, against the dissipation.
+/// Relative difference between the energy lost by the particles plus the work of other loads, and
+/// the dissipated energy.
 fn energy_error(run: &dyn Run, first: f64) -> f64 {
     let row = run.row();
     (first - row.potential_energy + row.work) / row.dissipated - 1.0
@@ -52,8 +53,8 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
         let now = (row.time, row.gauges[0].rate);
         from_rate += 0.5 * (now.0 - before.0) * (now.1 + before.1);
         before = now;
-        // Rows of particles cross mesh lines together: at most an eighth of a cell along the
-        // surface is uncertain while they do.
+        // Rows of particles cross mesh lines at the same time. While they do, an eighth of a cell
+        // along the surface is uncertain.
         assert!(row.drift[0].abs() < 5e-3, "t = {}: drift {}", row.time, row.drift[0]);
     });
     assert!(run.row().drift[0].abs() < 2e-3, "drift {}", run.row().drift[0]);
@@ -65,7 +66,7 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
     );
     assert!((volume / from_rate - 1.0).abs() < 5e-3, "{volume} {from_rate}");
     assert!(energy_error(run.as_ref(), first).abs() < 0.01);
-    // Particles stay inside, and their volumes add up to the grains'.
+    // Particles stay inside, and their volumes add up to that of the grains.
     let plan = run.plan();
     let total: f64 = run.particles().volume_of(0) * plan.units.area();
     assert!((total / 16.0 - 1.0).abs() < 1e-12, "{total}");
@@ -87,7 +88,8 @@ fn a_symmetric_silo_stays_symmetric() {
     }
 }
 
-/// A drop with directors and Cosserat rotation falling beside a wall; `turned` by 90 degrees.
+/// A drop with directors and Cosserat rotation that falls beside a wall; rotated by 90 degrees if
+/// `turned`.
 fn drop(turned: bool) -> Box<dyn Run> {
     // (x, y) -> (-y, x)
     let (domain_x, domain_y) =
@@ -115,7 +117,7 @@ fn drop(turned: bool) -> Box<dyn Run> {
 }
 
 #[test]
-fn a_turned_scene_gives_the_turned_result() {
+fn a_rotated_scene_gives_the_rotated_result() {
     let (mut a, mut b) = (drop(false), drop(true));
     for step in 0..12 {
         let scale = a.row().max_speed;
@@ -136,7 +138,7 @@ fn a_turned_scene_gives_the_turned_result() {
 
 #[test]
 fn initial_discharge_converges_from_below_at_first_order() {
-    // Uniform meshes; the limit is that of strongly graded ones, see below.
+    // Uniform meshes; the limit is from strongly graded ones, see below.
     let rate = |cells: &str| {
         preset("silo", &["alpha=0", "mesh.grading=[]", cells]).row().gauges[0].rate / 1e4
     };
@@ -147,25 +149,25 @@ fn initial_discharge_converges_from_below_at_first_order() {
     assert!(order > 0.8, "{order}");
 }
 
-/// Initial discharge in rho g a^3 / eta by internal length, +-2e-5: the limit of meshes of 8 to
-/// 16 cells per aperture graded towards the lips by 64 to 512.
+/// Initial discharge in rho g a^3 / eta by internal length, +-2e-5: the limit of meshes with 8 to
+/// 16 cells per aperture, graded towards the edges of the aperture by factors of 64 to 512.
 const DISCHARGE: [(&str, f64); 2] = [("alpha=0", 0.80314), ("alpha=1/3", 0.61330)];
 
 #[test]
-fn automatic_grading_finds_the_initial_discharge_in_no_more_cells_than_a_uniform_mesh() {
+fn automatic_grading_is_accurate_with_fewer_cells_than_a_uniform_mesh() {
     for (alpha, limit) in DISCHARGE {
         let run = preset("silo", &[alpha]);
         let cells = run.plan().mesh.cells();
         let rate = run.row().gauges[0].rate / 1e4;
         println!("{alpha}: {rate} in {cells} cells");
         assert!((rate / limit - 1.0).abs() < 3e-3, "{alpha}: {rate}, limit {limit}");
-        // Eight per aperture: 48 x 64.
+        // Uniform mesh with eight cells per aperture: 48 x 64.
         assert!(cells <= 3072, "{cells}");
     }
 }
 
 #[test]
-fn discharge_orders_in_alpha_and_levels_off() {
+fn discharge_decreases_with_alpha_and_levels_off() {
     let rate = |alpha: &str| {
         preset("silo", &[alpha, "mesh.grading=[]", "accuracy.cells=8"]).row().gauges[0].rate
     };
@@ -176,7 +178,7 @@ fn discharge_orders_in_alpha_and_levels_off() {
 }
 
 #[test]
-fn five_alphas_discharge_in_order_to_the_last_snapshot() {
+fn discharge_decreases_with_alpha_in_whole_runs() {
     let volume = |alpha: &str| {
         let mut run =
             preset("silo", &[alpha, "accuracy.cells=5", "mesh.grading=[]", "recording.frames=1"]);
@@ -196,7 +198,7 @@ fn five_alphas_discharge_in_order_to_the_last_snapshot() {
 }
 
 #[test]
-fn the_plain_method_of_the_source_agrees_in_whole_cells_and_is_stiffer_in_cut_ones() {
+fn particle_quadrature_agrees_in_uniform_cells_and_is_stiffer_in_cut_ones() {
     let rates = |quadrature: &str| {
         let sets = ["accuracy.cells=6", "mesh.grading=[]", quadrature];
         let mut run = preset("silo", &sets);
@@ -210,10 +212,10 @@ fn the_plain_method_of_the_source_agrees_in_whole_cells_and_is_stiffer_in_cut_on
     let ours = rates("accuracy.quadrature=mixture");
     let plain = rates("accuracy.quadrature=particles");
     println!("ours {ours:?}, plain {plain:?}");
-    // At first no cell is cut, and 4 x 4 regular points integrate well.
-    // Its error is that of the points at the singular lips: 1.6 %.
+    // Initially no cell is cut, and 4 x 4 regular points integrate well. The error of 1.6 % is that
+    // of the points near the singular edges.
     assert!((plain[0] / ours[0] - 1.0).abs() < 0.025, "{ours:?} {plain:?}");
-    // Then particles see the stiffer material of a cut cell in full.
+    // Later the stiffer material of a cut cell dominates in the particle quadrature.
     assert!(plain[1] < ours[1] && plain[1] > 0.8 * ours[1], "{ours:?} {plain:?}");
 }
 
@@ -238,7 +240,7 @@ fn compressible_particles_change_volume_with_the_flow() {
 
 #[test]
 fn cut_cosserat_drops_converge() {
-    // Fall of a Cosserat drop, its rim inside cells, in a fluid of other or the same viscosity.
+    // A Cosserat drop, with its boundary inside cells, falls in fluids of several viscosities.
     let speed = |viscosity: &str, cells: u32| {
         let text = format!(
             "schema = 1\nname = \"drop\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\

@@ -1,10 +1,10 @@
-//! Only what a scene calls for: a scene with an effect switched off is bit for bit the scene that
-//! never named it.
+//! Effects that a scene does not use change nothing: a scene with an effect switched off gives the
+//! same bits as a scene that does not mention it.
 
 use crate::{preset, scene};
 use grainscope::sim::Run;
 
-/// Everything a run computes, as bits: the particles' state and the diagnostics.
+/// Results of three steps as bits: hash of the state, and diagnostics.
 fn bits(mut run: Box<dyn Run>) -> (String, Vec<u64>) {
     for _ in 0..3 {
         run.step().unwrap();
@@ -17,7 +17,7 @@ fn bits(mut run: Box<dyn Run>) -> (String, Vec<u64>) {
     (run.state_hash(), numbers.into_iter().map(f64::to_bits).collect())
 }
 
-/// A box of one fluid under a moving lid, with something added.
+/// A box of one fluid under a moving lid; `more` is added at the top level.
 fn lid(more: &str) -> Box<dyn Run> {
     let text = format!(
         "schema = 1\nname = \"lid\"\n{more}\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
@@ -32,13 +32,13 @@ fn lid(more: &str) -> Box<dyn Run> {
 const FLUID: &str = "materials.fluid = { shear_viscosity = 2, density = 3 }";
 
 #[test]
-fn an_effect_switched_off_leaves_no_trace() {
+fn an_effect_switched_off_changes_nothing() {
     let plain = bits(lid(FLUID));
     for (effect, more) in [
         ("rotation: no internal length", "coupling_viscosity = 5, internal_length = 0"),
         ("rotation: no coupling", "coupling_viscosity = 0, internal_length = 0.1"),
         ("rotation: no couple viscosity", "coupling_viscosity = 5, couple_viscosity = 0"),
-        ("directors: layers as stiff as the rest", "layer_viscosity = 2"),
+        ("directors: layer viscosity equal to the viscosity", "layer_viscosity = 2"),
     ] {
         let fluid = format!("materials.fluid = {{ shear_viscosity = 2, density = 3, {more} }}");
         assert_eq!(bits(lid(&fluid)), plain, "{effect}");
@@ -50,7 +50,7 @@ fn an_effect_switched_off_leaves_no_trace() {
         ("dye", "dye = { lines = [], marks = [] }"),
         ("gauges", "gauges = []"),
         ("walls and blocks", "walls = []\nblocks = []"),
-        ("a background without room", "materials.air = { shear_viscosity = 7, background = true }"),
+        ("an unused background", "materials.air = { shear_viscosity = 7, background = true }"),
         ("a material without a region", "materials.none = { shear_viscosity = 1e9, density = 9 }"),
         (
             "a material with rotation and layers without a region",
@@ -74,7 +74,7 @@ fn stripped(text: &str, lines: &[&str], sets: &[&str]) -> Box<dyn Run> {
 }
 
 #[test]
-fn presets_with_an_effect_switched_off_are_those_that_never_named_it() {
+fn presets_with_an_effect_switched_off_equal_presets_without_it() {
     const COARSE: &str = "accuracy.cells=3";
     let silo = include_str!("../../presets/silo.toml");
     let never = stripped(
@@ -83,7 +83,7 @@ fn presets_with_an_effect_switched_off_are_those_that_never_named_it() {
         &[COARSE],
     );
     assert_eq!(bits(preset("silo", &[COARSE, "alpha=0"])), bits(never), "silo without rotation");
-    // What only looks does not touch what flows.
+    // Effects that only observe do not change the flow.
     let (state, _) = bits(preset("silo", &[COARSE]));
     let dye = &silo[silo.find("[dye.grid]").unwrap()..silo.find("[interest]").unwrap()];
     let (undyed, _) = bits(stripped(silo, &[dye], &[COARSE]));

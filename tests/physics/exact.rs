@@ -1,10 +1,11 @@
-//! Cosserat Couette, Poiseuille and the coupled cell, against their exact solutions.
+//! Compares Cosserat Couette and Poiseuille flow and the coupled cell with their exact solutions.
 
 use grainscope::cases::{Case, Fluid, couette, coupled_cell, poiseuille};
 
+/// Fluid of all cases.
 const FLUID: Fluid = Fluid { shear: 1.0, coupling: 1.0, internal_length: 0.3 };
 
-/// Observed rates over a doubling of the cells, and the finer errors.
+/// Checks the convergence rates when the number of cells is doubled.
 fn check_rates(case: &Case, coarse: u32) {
     let a = case.errors(coarse, &[]).unwrap();
     let b = case.errors(2 * coarse, &[]).unwrap();
@@ -39,7 +40,7 @@ fn coupled_cell_converges_at_the_elements_order() {
 
 #[test]
 fn couette_has_the_apparent_viscosity_of_theory() {
-    // verification.md gives these two values to eleven digits.
+    // Values of linear theory to eleven digits.
     for (coupling, length, apparent) in [(1.0, 0.3, 1.3876032024), (0.5, 0.1, 1.0612713453)] {
         let fluid = Fluid { shear: 1.0, coupling, internal_length: length };
         let run = couette(fluid, 1.0).solve(48, &[]).unwrap();
@@ -49,10 +50,10 @@ fn couette_has_the_apparent_viscosity_of_theory() {
 }
 
 #[test]
-fn poiseuille_discharges_what_theory_says() {
+fn poiseuille_has_the_discharge_of_theory() {
     let mut run = crate::preset("poiseuille_cosserat", &["accuracy.cells=24", "time.end=0.4"]);
     let rate = run.row().gauges[0].rate;
-    // The gauge integrates with 8 samples a cell: second order in the profile.
+    // The gauge integrates with 8 samples per cell, at second order in the profile.
     assert!((rate / 0.04778428 - 1.0).abs() < 1e-4, "{rate}");
     crate::finish(run.as_mut(), |_| {});
     let volume = run.row().gauges[0].volume;
@@ -71,7 +72,7 @@ fn free_rotation_at_the_walls_gives_the_classical_solution() {
 
 #[test]
 fn infinite_internal_length_scales_all_velocities() {
-    // R -> infinity between straight walls: velocities times eta/(eta + eta_c).
+    // R -> infinity between straight walls: velocities are multiplied by eta/(eta + eta_c).
     let fluid = Fluid { shear: 1.0, coupling: 3.0, internal_length: 1e4 };
     let run = couette(fluid, 1.0).solve(8, &[]).unwrap();
     for y in [-0.4, 0.1, 0.5] {

@@ -1,8 +1,13 @@
-//! A conformance suite for the laws: symmetric, positive, frame-indifferent, right in the limits.
+//! A conformance suite for the laws that assembly calls: symmetric, positive, frame-indifferent, equal
+//! to the source's equations, right in the limits.
 
-use grainscope::laws::point::{Mixture, PointLaw, Sym2};
-use grainscope::laws::{cosserat, director, granular, layered};
-use nalgebra::{Matrix2, Matrix4, Rotation2, Vector2, Vector4};
+use grainscope::laws::cosserat::Cosserat;
+use grainscope::laws::director::{self, Orientation};
+use grainscope::laws::mixture::Mixture;
+use grainscope::laws::point::{PointLaw, Sym2};
+use grainscope::laws::rates::{Rates, Stress};
+use grainscope::laws::{Here, Law, Shear, granular};
+use nalgebra::{Matrix2, Matrix6, Rotation2, Vector2, Vector6};
 
 const ETA: f64 = 1000.0;
 const ANGLES: [f64; 7] =
@@ -12,86 +17,173 @@ fn unit(angle: f64) -> Vector2<f64> {
     Vector2::new(angle.cos(), angle.sin())
 }
 
-/// Laws as matrices on the Cosserat measures, as functions of the frame's rotation.
-fn laws() -> Vec<Box<dyn Fn(f64) -> Matrix4<f64>>> {
-    let mut list: Vec<Box<dyn Fn(f64) -> Matrix4<f64>>> = vec![
-        Box::new(|_| cosserat::viscosity(ETA, 300.0, 5.0 * ETA)),
-        Box::new(|_| cosserat::viscosity(ETA, 0.0, 1e-2 * ETA)),
-    ];
-    for a in ANGLES {
-        list.push(Box::new(move |turn| {
-            cosserat::viscosity(ETA, 300.0, 2.0 * ETA)
-                + layered::correction(ETA, 1.0, &unit(a + turn))
-        }));
+/// Every kind of law, classical and Cosserat, incompressible and not.
+fn laws() -> Vec<Law> {
+    let mut list = Vec::new();
+    for shear in [
+        Shear::Newtonian,
+        Shear::Layered { layer_viscosity: 1.0 },
+        Shear::Layered { layer_viscosity: 3.0 * ETA },
+    ] {
+        for rotation in [None, Some(Cosserat { coupling: 300.0, couple: 12.0 })] {
+            for compliance in [0.0, 1e-4] {
+                list.push(Law { shear, rotation, compliance });
+            }
+        }
     }
     list
 }
 
-/// Measures as a 2x2 tensor and back.
-fn tensor(g: &Vector4<f64>) -> Matrix2<f64> {
-    Matrix2::new(g[0], g[2], g[3], g[1])
-}
-fn vector(m: &Matrix2<f64>) -> Vector4<f64> {
-    Vector4::new(m[(0, 0)], m[(1, 1)], m[(0, 1)], m[(1, 0)])
+/// The law of a material whose layers have their normal at an angle.
+fn at(law: &Law, angle: f64) -> PointLaw {
+    let orientation = Orientation::of([angle.cos(), angle.sin()]);
+    law.at(&Here::at_rest(ETA, &orientation))
 }
 
-#[test]
-fn laws_are_symmetric_and_positive() {
-    for law in laws() {
-        let c = law(0.0);
-        assert!((c - c.transpose()).norm() < 1e-9 * ETA);
-        let lowest = c.symmetric_eigenvalues().min();
-        assert!(lowest > -1e-9 * ETA, "{lowest}");
-    }
+fn rates(l: &Matrix2<f64>, w: f64, kappa: Vector2<f64>) -> Rates {
+    Rates::cosserat([[l.m11, l.m12], [l.m21, l.m22]], w, [kappa.x, kappa.y])
 }
 
+/// The viscous stress tensor and the couple stresses.
+fn tensors(s: &Stress) -> (Matrix2<f64>, Vector2<f64>) {
+    let [a, b] = s.deviator;
+    let skew = 0.5 * s.skew;
+    (Matrix2::new(s.mean + a, b - skew, b + skew, s.mean - a), Vector2::from(s.couple))
+}
+
+fn vector(r: &Rates) -> Vector6<f64> {
+    Vector6::from([r.d[0], r.d[1], r.trace, r.relative_spin, r.kappa[0], r.kappa[1]])
+}
+
+fn rates_of(v: &Vector6<f64>) -> Rates {
+    Rates { d: [v[0], v[1]], trace: v[2], relative_spin: v[3], kappa: [v[4], v[5]] }
+}
+
+fn stress_vector(law: &PointLaw, v: &Vector6<f64>) -> Vector6<f64> {
+    let s = law.stress(&rates_of(v), 1.0);
+    Vector6::from([s.deviator[0], s.deviator[1], s.mean, s.skew, s.couple[0], s.couple[1]])
+}
+
+const SOME: [f64; 6] = [0.3, -0.7, 0.2, 1.1, -0.4, 0.9];
+
 #[test]
-fn laws_are_frame_indifferent() {
-    let gamma = Vector4::new(0.3, -0.7, 1.1, 0.2);
+fn stresses_have_a_symmetric_positive_derivative_and_do_positive_work() {
     for law in laws() {
-        for turn in ANGLES {
-            let q = *Rotation2::new(turn).matrix();
-            let turned = vector(&(q * tensor(&gamma) * q.transpose()));
-            let a = q * tensor(&(law(0.0) * gamma)) * q.transpose();
-            let b = tensor(&(law(turn) * turned));
-            assert!((a - b).norm() < 1e-9 * ETA, "{turn}: {a} {b}");
+        for angle in ANGLES {
+            let law = at(&law, angle);
+            let here = Vector6::from(SOME);
+            let mut tangent = Matrix6::zeros();
+            for k in 0..6 {
+                let h = 1e-3;
+                let mut there = here;
+                there[k] += h;
+                let change = (stress_vector(&law, &there) - stress_vector(&law, &here)) / h;
+                tangent.set_column(k, &change);
+            }
+            assert!((tangent - tangent.transpose()).norm() < 1e-7 * ETA);
+            assert!(tangent.symmetric_eigenvalues().min() > -1e-7 * ETA);
+            // A linear law is its own derivative.
+            assert!((tangent * here - stress_vector(&law, &here)).norm() < 1e-7 * ETA);
+            let work = stress_vector(&law, &here).dot(&here);
+            assert!(work > 0.0 && (work - law.power(&rates_of(&here))).abs() < 1e-12 * work);
         }
     }
 }
 
 #[test]
-fn layers_of_equal_viscosity_are_isotropic_and_directors_are_axes() {
-    for a in ANGLES {
-        assert_eq!(layered::correction(ETA, ETA, &unit(a)), Matrix4::zeros());
-        let (n, m) = (unit(a), unit(a + std::f64::consts::PI));
-        let difference = layered::correction(ETA, 10.0, &n) - layered::correction(ETA, 10.0, &m);
-        assert!(difference.norm() < 1e-9);
+fn laws_are_frame_indifferent() {
+    let l = Matrix2::new(0.3, -0.7, 1.1, 0.2);
+    let (w, kappa) = (0.4, Vector2::new(0.5, -0.8));
+    for law in laws() {
+        for angle in ANGLES {
+            for turn in ANGLES {
+                let q = *Rotation2::new(turn).matrix();
+                let (stress, couple) = tensors(&at(&law, angle).stress(&rates(&l, w, kappa), 1.0));
+                let turned = rates(&(q * l * q.transpose()), w, q * kappa);
+                let (other, couple_other) = tensors(&at(&law, angle + turn).stress(&turned, 1.0));
+                assert!((q * stress * q.transpose() - other).norm() < 1e-9 * ETA, "{turn}");
+                assert!((q * couple - couple_other).norm() < 1e-9 * ETA, "{turn}");
+            }
+        }
     }
 }
 
 #[test]
-fn deviatoric_form_agrees_with_the_matrix() {
-    for a in ANGLES {
-        let n = unit(a);
-        let gamma = Vector4::new(0.4, -0.4, 0.9, -0.1);
-        let c = cosserat::viscosity(ETA, 0.0, 0.0) + layered::correction(ETA, 50.0, &n);
-        let sigma = c * gamma;
-        let s = layered::deviatoric(ETA, 50.0, &n)
-            * Vector2::new(gamma[0] - gamma[1], gamma[2] + gamma[3]);
-        assert!((0.5 * (sigma[0] - sigma[1]) - s[0]).abs() < 1e-9);
-        assert!((0.5 * (sigma[2] + sigma[3]) - s[1]).abs() < 1e-9);
-        let e = layered::deviatoric(ETA, 50.0, &n).symmetric_eigenvalues();
-        assert!((e.max() - ETA).abs() < 1e-9 && (e.min() - 50.0).abs() < 1e-9);
+fn stresses_are_those_of_the_source() {
+    // (10)-(13) and (19)-(20), index by index; `-p` replaces the trace's part where incompressible.
+    let l = Matrix2::new(0.4, 0.9, -0.1, -0.4);
+    let (w, kappa) = (0.35, Vector2::new(0.5, -0.8));
+    let (coupling, couple, eta_s) = (300.0, 12.0, 50.0);
+    for angle in ANGLES {
+        let n = unit(angle);
+        let d = 0.5 * (l + l.transpose());
+        let delta = |i: usize, j: usize| if i == j { 1.0_f64 } else { 0.0 };
+        let a = |i: usize, j: usize, k: usize, m: usize| {
+            0.5 * (n[i] * n[k] * delta(m, j)
+                + n[j] * n[k] * delta(i, m)
+                + n[i] * n[m] * delta(k, j)
+                + n[j] * n[m] * delta(i, k))
+                - 2.0 * n[i] * n[j] * n[k] * n[m]
+        };
+        let mut expected = 2.0 * ETA * d;
+        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            for (k, m) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                expected[(i, j)] -= 2.0 * (ETA - eta_s) * a(i, j, k, m) * d[(k, m)];
+            }
+        }
+        // sigma_yx - sigma_xy = 4 eta_c (o - w)
+        let spin = 0.5 * (l[(1, 0)] - l[(0, 1)]);
+        let skew = 2.0 * coupling * (spin - w);
+        expected += Matrix2::new(0.0, -skew, skew, 0.0);
+        let law = Law {
+            shear: Shear::Layered { layer_viscosity: eta_s },
+            rotation: Some(Cosserat { coupling, couple }),
+            compliance: 0.0,
+        };
+        let (stress, couples) = tensors(&at(&law, angle).stress(&rates(&l, w, kappa), 1.0));
+        assert!((stress - expected).norm() < 1e-9 * ETA, "{angle}: {stress} {expected}");
+        assert!((couples - couple * kappa).norm() < 1e-9);
     }
 }
 
 #[test]
-fn one_orientation_feels_the_viscosity_of_its_angle_in_simple_shear() {
-    for a in ANGLES {
-        let gamma = Vector4::new(0.0, 0.0, 1.0, 0.0);
-        let c = cosserat::viscosity(ETA, 0.0, 0.0) + layered::correction(ETA, 500.0, &unit(a));
-        let expected = 500.0 + 500.0 * (2.0 * a).sin().powi(2);
-        assert!(((c * gamma)[2] - expected).abs() < 1e-9, "{a}");
+fn laws_have_their_limits() {
+    let shear = |layer_viscosity, angle| {
+        let law = Law { shear: Shear::Layered { layer_viscosity }, ..Law::default() };
+        at(&law, angle).shear
+    };
+    for angle in ANGLES {
+        // Layers as viscous as the rest are isotropic, and directors are axes.
+        assert_eq!(shear(ETA, angle), at(&Law::default(), 0.0).shear);
+        let (s, t) = (shear(10.0, angle), shear(10.0, angle + std::f64::consts::PI));
+        assert!((s.a - t.a).abs() + (s.b - t.b).abs() + (s.c - t.c).abs() < 1e-9);
+        // One orientation has the viscosity of its angle in simple shear.
+        let viscosity = shear(500.0, angle).quadratic([0.0, 1.0]);
+        assert!((viscosity - 500.0 - 500.0 * (2.0 * angle).sin().powi(2)).abs() < 1e-9);
+        // The eigenvalues are eta and eta_s.
+        let s = shear(50.0, angle);
+        let m = Matrix2::new(s.a, s.c, s.c, s.b).symmetric_eigenvalues();
+        assert!((m.max() - ETA).abs() < 1e-9 && (m.min() - 50.0).abs() < 1e-9);
+    }
+    // A finite bulk viscosity takes the trace out of the viscous part.
+    let compressible = Law { compliance: 1e-3, ..Law::default() };
+    assert_eq!(at(&compressible, 0.0).dilation, 0.0);
+    // A classical fluid feels no rotation.
+    let classical = at(&Law::default(), 0.0).stress(&rates_of(&Vector6::from(SOME)), 1.0);
+    assert_eq!((classical.skew, classical.couple), (0.0, [0.0; 2]));
+}
+
+#[test]
+fn laws_depend_on_nothing_that_they_do_not_declare() {
+    let orientation = Orientation::of([0.6, 0.8]);
+    for law in laws() {
+        let declared = law.depends_on();
+        let rest = Here::at_rest(ETA, &orientation);
+        let here = Here { rates: rates_of(&Vector6::from(SOME)), pressure: 7.0, ..rest };
+        assert!(declared.needs_flow() || law.at(&here) == law.at(&rest));
+        let other = Orientation::of([0.8, -0.6]);
+        let turned = Here { orientation: &other, ..rest };
+        assert!(declared.history || law.at(&turned) == law.at(&rest));
     }
 }
 
@@ -99,8 +191,7 @@ fn one_orientation_feels_the_viscosity_of_its_angle_in_simple_shear() {
 fn a_rigid_rotation_with_matching_spin_gives_exactly_zero() {
     for w in [1.0, -0.37, 1e6] {
         let l = Matrix2::new(0.0, -w, w, 0.0);
-        assert_eq!(cosserat::spin(&l), w);
-        assert_eq!(cosserat::measures(&l, w), Vector4::zeros());
+        assert_eq!(vector(&rates(&l, w, Vector2::zeros())), Vector6::zeros());
     }
 }
 
@@ -127,17 +218,17 @@ fn the_director_follows_the_exact_map_in_shear_strain_and_rotation() {
         }
         let expected = Vector2::new(a.cos(), a.sin() - 4.0 * a.cos()).normalize();
         assert!((n - expected).norm() < 1e-12 && (n.norm() - 1.0).abs() < 1e-15);
-        // A rotation turns it with the body.
+        // A rigid rotation rotates it with the body.
         let n = director::advance(&unit(a), &Matrix2::new(0.0, -1.0, 1.0, 0.0), 0.4);
         assert!((n - unit(a + 0.4)).norm() < 1e-12);
-        // Pure strain, a huge step: still a unit vector, on the axis of compression.
+        // After a large step of pure strain it is still a unit vector.
         let n = director::advance(&unit(a), &Matrix2::new(1.0, 0.0, 0.0, -1.0), 30.0);
         assert!((n.norm() - 1.0).abs() < 1e-12);
     }
 }
 
 #[test]
-fn exponential_is_that_of_the_series() {
+fn exponential_equals_its_series() {
     for l in [
         Matrix2::new(0.3, -1.2, 0.4, 0.1),
         Matrix2::new(0.0, 1.0, 0.0, 0.0),

@@ -1,4 +1,4 @@
-//! What the physics demands: exact solutions, rates, invariants, symmetry.
+//! Physics tests: exact solutions, convergence rates, invariants and symmetry.
 
 mod alignment;
 mod dynamics;
@@ -16,7 +16,7 @@ use grainscope::scene::{SceneSource, parse};
 use grainscope::sim::{self, Run};
 use std::sync::Arc;
 
-/// A run of a scene text or preset, with `--set`s, at its first instant.
+/// Starts a run of a scene with `--set` assignments.
 pub fn start(source: SceneSource, sets: &[&str]) -> Box<dyn Run> {
     let sets: Vec<String> = sets.iter().map(|s| s.to_string()).collect();
     let source = source.with_sets(&sets).unwrap_or_else(|e| panic!("{:?}", e.lines()));
@@ -25,15 +25,17 @@ pub fn start(source: SceneSource, sets: &[&str]) -> Box<dyn Run> {
     sim::start(Arc::new(plan)).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// Starts a run of a preset with `--set` assignments.
 pub fn preset(name: &str, sets: &[&str]) -> Box<dyn Run> {
     start(grainscope::scene::presets::find(name).unwrap_or_else(|e| panic!("{e}")), sets)
 }
 
+/// Starts a run of a scene text with `--set` assignments.
 pub fn scene(text: &str, sets: &[&str]) -> Box<dyn Run> {
     start(SceneSource::new("test", text), sets)
 }
 
-/// Steps to the end.
+/// Takes all steps to the end; `each` is called at the start and after each step.
 pub fn finish(run: &mut dyn Run, mut each: impl FnMut(&dyn Run)) {
     each(run);
     while !run.is_finished() {

@@ -1,4 +1,4 @@
-//! Transport and directors are of second order in the time step.
+//! Tests that transport and directors are of second order in the time step.
 
 use crate::{finish, preset, scene};
 use grainscope::motion::carrier::{Carrier, Currents};
@@ -7,18 +7,19 @@ use grainscope::space::mesh::{Axis, Mesh};
 use grainscope::space::walls::Enclosure;
 use std::f64::consts::PI;
 
-/// Smallest order between neighbouring errors, and all of them printed.
+/// Smallest order between neighbouring errors; prints all orders.
 fn order(what: &str, errors: &[f64]) -> f64 {
     let orders: Vec<f64> = errors.windows(2).map(|e| (e[0] / e[1]).log2()).collect();
     println!("{what}: errors {errors:?}, orders {orders:.2?}");
     orders.into_iter().fold(f64::INFINITY, f64::min)
 }
 
+/// Largest distance between two lists of points.
 fn worst(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     a.iter().zip(b).map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1])).fold(0.0, f64::max)
 }
 
-/// Root mean square.
+/// Root mean square distance between two lists of points.
 fn mean(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     let sum: f64 =
         a.iter().zip(b).map(|(p, q)| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)).sum();
@@ -27,7 +28,7 @@ fn mean(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
 
 #[test]
 fn points_and_directors_in_a_steady_vortex() {
-    // psi = sin pi x sin pi y / pi: a turn takes two or more units of time.
+    // psi = sin pi x sin pi y / pi: a revolution takes at least two units of time.
     let lines: Vec<f64> = (0..=12).map(|k| f64::from(k) / 12.0).collect();
     let mesh = Mesh::new(Axis::new(lines.clone(), false), Axis::new(lines, false));
     let velocity: Vec<[f64; 2]> = (0..mesh.nodes())
@@ -65,7 +66,7 @@ fn points_and_directors_in_a_steady_vortex() {
     assert!(points > 1.9 && directors > 1.8, "{points} {directors}");
 }
 
-/// Ends of the dye's lines.
+/// End points of the dye lines.
 fn ends(run: &dyn Run) -> Vec<[f64; 2]> {
     let lines = run.picture().dye_lines;
     let end = |p: &[f32; 2]| p.map(f64::from);
@@ -109,13 +110,14 @@ fn directors_of_one_angle_in_a_sheared_layer() {
         let turned = (angle.sin() - n[1] / n[0] * angle.cos()) / angle.cos();
         (turned - exact).abs()
     };
-    // Below, 0.008 of a shear of ten or more stays: a layer that softens is not quite uniform.
+    // At smaller steps an error of 0.008 remains in a shear of ten or more: a softening layer is
+    // not quite uniform.
     let shear = order("shear", &[0.01, 0.005, 0.0025].map(error));
     assert!(shear > 1.8, "{shear}");
 }
 
 #[test]
-fn dye_where_turning_directors_change_the_flow() {
+fn dye_and_directors_that_change_the_flow() {
     let moved = |step: f64| {
         let text = format!(
             "schema = 1\nname = \"cell\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\ncells = 8\nparticles_per_cell = 64\n\
@@ -136,7 +138,7 @@ fn dye_where_turning_directors_change_the_flow() {
         };
         (ends(run.as_ref()), vec![[mean(&|n| n[0] * n[0]), mean(&|n| n[0] * n[1])]])
     };
-    // Below a step of 0.02 the errors reach those of the integration points.
+    // At steps below 0.02 the errors reach those of the integration points.
     let reference = moved(0.4 / 256.0);
     let runs = [0.4 / 4.0, 0.4 / 8.0, 0.4 / 16.0].map(moved);
     let dye = order("dye", &runs.each_ref().map(|r| mean(&r.0, &reference.0)));

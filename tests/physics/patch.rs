@@ -1,10 +1,11 @@
-//! Patch tests at rounding: what the elements contain, they reproduce, wherever the particles are.
+//! Patch tests: the elements reproduce solutions in their space up to rounding, for any particles.
 
 use crate::scene;
 
+/// Largest error of a velocity.
 const TOLERANCE: f64 = 1e-10;
 
-/// Two materials of one law in cut cells, random particles, a graded mesh.
+/// A scene with two materials of one law in cut cells, random particles and a graded mesh.
 fn patch(boundaries: &str, extra: &str) -> String {
     format!(
         "schema = 1\nname = \"patch\"\n[domain]\nx = [0, 1.3]\ny = [-0.2, 0.7]\n\
@@ -23,7 +24,7 @@ const CLASSICAL: &str =
 const COMPRESSIBLE: &str = "[materials.a]\nshear_viscosity = 2.5\nbulk_viscosity = 4\n\
                             [materials.b]\nshear_viscosity = 2.5\nbulk_viscosity = 4\n";
 
-/// Linear velocity `L x` prescribed all around, rotation equal to the spin.
+/// Checks the linear velocity `L x`, prescribed on all sides, with the rotation equal to the spin.
 fn linear(l: [[f64; 2]; 2], materials: &str) {
     let side = format!(
         "velocity_x = \"{:?}*x + {:?}*y\", velocity_y = \"{:?}*x + {:?}*y\"",
@@ -65,11 +66,11 @@ fn uniform_compression_of_a_compressible_fluid() {
 }
 
 #[test]
-fn constant_density_moves_nothing() {
+fn a_constant_density_causes_no_flow() {
     let materials = "gravity = [3, -10]\n[materials.a]\nshear_viscosity = 2.5\ndensity = 7\n\
                      [materials.b]\nshear_viscosity = 2e4\ndensity = 7\n";
     let text = patch("", "");
-    // Gravity is a top-level key: it goes before the tables.
+    // Gravity is a top-level key, so it must precede the tables.
     let text = text.replacen("name = \"patch\"\n", "name = \"patch\"\ngravity = [3, -10]\n", 1);
     let text = text.replace(
         "[[regions]]\nmaterial = \"a\"",
@@ -85,7 +86,7 @@ fn constant_density_moves_nothing() {
 
 #[test]
 fn given_tractions_of_a_uniform_stress() {
-    // u = (y, 0): sigma_xy = eta; the left side is held, the others pulled.
+    // u = (y, 0): sigma_xy = eta. Velocity is given on the left side, traction on the others.
     let boundaries = "[boundaries]\nleft = { velocity_x = \"y\", velocity_y = 0 }\n\
         right = { kind = \"open\", traction_y = 2.5 }\n\
         bottom = { kind = \"open\", traction_x = -2.5 }\ntop = { kind = \"open\", traction_x = 2.5 }\n";

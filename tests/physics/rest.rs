@@ -1,7 +1,9 @@
-//! What is at rest stays at rest, wherever the particles lie and wherever a level cuts the cells.
+//! Tests that fluids at rest stay at rest for any particle placement and any level inside the
+//! cells.
 
 use crate::{preset, scene};
 
+/// Values of `accuracy.placement`.
 const PLACEMENTS: [&str; 3] = ["regular", "jittered", "random"];
 /// `rho g a^2 / eta` of these scenes, m/s.
 const SCALE: f64 = 100.0;
@@ -21,7 +23,7 @@ fn a_level_inside_a_cell_does_not_move() {
     }
 }
 
-/// Fastest motion of a unit box at its first instant.
+/// Largest initial speed in a unit box, in units of [`SCALE`].
 fn speed(gravity: &str, cells: u32, placement: &str, rest: &str) -> f64 {
     let text = format!(
         "schema = 1\nname = \"rest\"\ngravity = {gravity}\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
@@ -32,8 +34,8 @@ fn speed(gravity: &str, cells: u32, placement: &str, rest: &str) -> f64 {
 
 #[test]
 fn stratified_fluids_hardly_move() {
-    // A linear density is fitted exactly from any places; another leaves the noise of what a
-    // quadratic cannot follow, which falls at third order and faster.
+    // A linear density is fitted exactly for any placement. Other densities leave the error of the
+    // quadratic fit, which falls at third order or faster.
     for (density, at_32) in
         [("1000*(1-y)", 1e-12), ("1000*exp(-3*y)", 1e-7), ("500*(1-tanh((y-0.5)/0.2))", 1e-6)]
     {
@@ -57,9 +59,9 @@ fn stratified_fluids_hardly_move() {
 }
 
 #[test]
-fn oblique_levels_and_strata_move_less_at_second_and_third_order() {
-    // Gravity at an angle to the mesh: the kink of the pressure, and its curvature, lie oblique
-    // to the cells, whose linear pressure cannot follow; particles add nothing to that.
+fn the_speed_of_oblique_levels_and_strata_converges() {
+    // With gravity at an angle to the mesh, the linear pressure of a cell cannot represent the kink
+    // and the curvature of the hydrostatic pressure. Particles do not add to this error.
     let level = "[materials.a]\ndensity = 1000\nshear_viscosity = 100\n\
                  [materials.b]\nshear_viscosity = 100\nbackground = true\n\
                  [[regions]]\nmaterial = \"a\"\nshape.where = \"0.6*(x-0.5) - 0.8*(y-0.5137) > 0\"\n";
@@ -77,7 +79,7 @@ fn oblique_levels_and_strata_move_less_at_second_and_third_order() {
     }
 }
 
-/// Volume of the particles of the second material.
+/// Volume of the particles of the second material, as a share of the total.
 fn volume(region: &str, placement: &str) -> f64 {
     let text = format!(
         "schema = 1\nname = \"part\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\ncells = 8\n\
@@ -91,11 +93,11 @@ fn volume(region: &str, placement: &str) -> f64 {
 }
 
 #[test]
-fn particles_stand_for_exactly_what_the_regions_fill() {
+fn particle_volumes_equal_the_areas_of_regions() {
     use std::f64::consts::PI;
     for (region, area, tolerance) in [
         ("shape.rectangle = { x = [0.111, 0.733], y = [0.3, 0.377] }", 0.622 * 0.077, 1e-12),
-        // Thinner and smaller than the particles' spacing.
+        // Thinner and smaller than the particle spacing.
         ("shape.rectangle = { x = [0.2, 0.9], y = [0.51, 0.5101] }", 0.7e-4, 1e-12),
         ("shape.rectangle = { x = [0.51, 0.5101], y = [0.2, 0.9] }", 0.7e-4, 1e-12),
         ("shape.circle = { centre = [0.47, 0.53], radius = 0.003 }", PI * 9e-6, 0.02 * PI * 9e-6),

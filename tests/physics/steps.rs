@@ -1,10 +1,10 @@
-//! Large steps of stratified fluids, and growth rates of unstable ones.
+//! Tests large time steps of stable stratified fluids, and growth rates of unstable ones.
 
 use crate::scene;
 use grainscope::cases::rayleigh_taylor::{Undulation, growth_ratio};
 use grainscope::sim::Run;
 
-/// A heavy fluid below a light one in a unit box, their interface a cosine.
+/// A heavy fluid below a light one in a unit box, with a cosine-shaped interface.
 fn sloshing(viscosity: f64, amplitude: f64, sets: &[&str]) -> Box<dyn Run> {
     let text = format!(
         "schema = 1\nname = \"slosh\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
@@ -17,7 +17,7 @@ fn sloshing(viscosity: f64, amplitude: f64, sets: &[&str]) -> Box<dyn Run> {
     scene(&text, sets)
 }
 
-/// Relaxation time of the interface's first mode.
+/// Relaxation time of the first mode of the interface, s.
 fn relaxation(run: &dyn Run, amplitude: f64) -> f64 {
     -amplitude / run.velocity_at([0.0, 0.5])[1]
 }
@@ -46,7 +46,7 @@ fn a_disturbed_level_comes_to_rest_at_any_step() {
     // Only the Courant number limits the step.
     let [longest, latest] = late(&[]);
     assert!(longest > 30.0 && latest < 0.05, "{longest} {latest}");
-    // Without stabilisation it sloshes for ever, at a step of less than two relaxation times.
+    // Without stabilisation it oscillates without decay, at steps below three relaxation times.
     let [longest, latest] = late(&["accuracy.stabilisation=0"]);
     assert!(longest < 3.0 && latest > 0.3, "{longest} {latest}");
 }
@@ -60,7 +60,8 @@ fn a_level_at_rest_stays_at_rest_at_any_step() {
     }
 }
 
-/// A stratified fluid, its strata disturbed: velocities when most of that has decayed, by steps.
+/// Velocities of a disturbed stratified fluid after most of the disturbance has decayed in `steps`
+/// steps.
 fn settled(steps: u32, sets: &[&str]) -> Vec<f64> {
     let text = format!(
         "schema = 1\nname = \"strata\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
@@ -87,15 +88,15 @@ fn stabilised_steps_are_second_order_and_no_less_accurate() {
     };
     let [coarse, fine] = [16, 32].map(|steps| error(steps, &[]));
     let plain = error(32, &["accuracy.stabilisation=0"]);
-    println!("stabilised {coarse:e} {fine:e}, not {plain:e}");
+    println!("stabilised {coarse:e} {fine:e}, not stabilised {plain:e}");
     assert!((coarse / fine).log2() > 1.8, "{coarse:e} {fine:e}");
     assert!(fine < plain, "{fine:e} {plain:e}");
 }
 
 #[test]
-fn small_undulations_grow_as_linear_theory_says() {
-    // Undulations of a hundredth of a cell and less; the interface cuts cells at 64 and lies on a
-    // mesh line at 50. At 32 cells the cut one is off by up to 1.4 %.
+fn small_undulations_grow_at_the_rate_of_linear_theory() {
+    // The amplitude is at most a hundredth of a cell. The interface cuts cells at 64 cells and lies
+    // on a mesh line at 50. At 32 cells, with cut cells, the error is up to 1.4 %.
     for (cells, amplitude, viscosities) in
         [(64, 1e-4, &[0.1, 1.0, 10.0, 100.0][..]), (50, 2e-5, &[0.01, 0.1, 1.0, 10.0, 100.0])]
     {

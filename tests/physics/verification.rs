@@ -1,8 +1,8 @@
-//! The quick version of what `grainscope verify` measures, and the page it has written.
+//! Runs the quick version of `grainscope verify`, and compares results with docs/verification.md.
 
 use grainscope::verify::{Effort, SUBJECTS, run};
 
-/// One subject, all of its checks.
+/// Checks that all checks of a subject pass.
 fn check(name: &str) {
     let report = run(&[name], Effort::Quick, |_| {}).unwrap_or_else(|e| panic!("{e}"));
     assert!(report.checks() > 0, "{name} checks nothing");
@@ -58,9 +58,9 @@ fn every_subject_is_tested() {
     }
 }
 
-/// Rows of tables of numbers that the quick version computes too must stand in the page.
+/// Table rows that the quick version also computes must be in the page.
 #[test]
-fn the_page_shows_what_the_program_computes() {
+fn the_page_agrees_with_the_program() {
     let page = include_str!("../../docs/verification.md");
     let report =
         run(&["elements", "layers"], Effort::Quick, |_| {}).unwrap_or_else(|e| panic!("{e}"));

@@ -1,17 +1,17 @@
-//! Room around the domain, and where legends stand in it.
+//! This module computes the margins around the domain and the positions of the legends in them.
 
 use crate::frame::Rect;
 
 /// Margin around the domain, relative to its larger side.
 const MARGIN: f32 = 0.03;
 
-/// Room below the domain for a colour bar and its numbers. The numbers have
-/// the same size on screen in every view, so small views need more of it.
+/// Space below the domain for a colour bar and its numbers. The numbers have the same size on
+/// screen in every view, so small views need more space.
 #[derive(Clone, Copy)]
 pub(super) enum Room {
-    /// The view is most of the screen high.
+    /// Space for a view that fills most of the height of the screen.
     Large,
-    /// The view is about a third of the screen high.
+    /// Space for a view of about a third of the height of the screen.
     Small,
 }
 
@@ -24,14 +24,14 @@ impl Room {
     }
 }
 
-/// The larger side, damped for long flat domains: their views are as wide as
-/// others, so their legends need as much room on screen.
+/// Reference length for the legends (m): the larger side, reduced for long flat domains. Their
+/// views are as wide as others, so their legends need as much space on screen.
 fn reach(domain: Rect) -> f32 {
     let [width, height] = domain.size();
     height.max(0.6 * width)
 }
 
-/// What a view of the domain shows.
+/// The rectangle that a view of the domain shows (m).
 pub(super) fn seen(domain: Rect, room: Room) -> Rect {
     let reach = reach(domain);
     let margin = MARGIN * reach;
@@ -41,7 +41,7 @@ pub(super) fn seen(domain: Rect, room: Room) -> Rect {
     }
 }
 
-/// Where a colour bar stands: below the domain.
+/// The rectangle of a colour bar, below the domain (m).
 pub(super) fn place(domain: Rect) -> Rect {
     let reach = reach(domain);
     Rect {
@@ -50,7 +50,7 @@ pub(super) fn place(domain: Rect) -> Rect {
     }
 }
 
-/// Where the names of materials stand: in a row below the domain.
+/// The positions of the material names, in a row below the domain (m).
 pub(super) fn row(domain: Rect, count: usize) -> impl Iterator<Item = [f32; 2]> + Clone {
     let reach = reach(domain);
     let [width, _] = domain.size();

@@ -1,9 +1,8 @@
-//! The layout a viewer opens with.
+//! This module defines the layout that a viewer opens with.
 //!
-//! Rerun's own builder has no setters for visual bounds, legends or
-//! backgrounds, and draws random identifiers. So the few archetypes a layout
-//! consists of are logged here one by one, under identifiers that count up:
-//! the same run always gives the same layout.
+//! Rerun's own builder has no setters for visual bounds, legends or backgrounds, and uses random
+//! identifiers. So the few archetypes of a layout are logged here one by one, with identifiers that
+//! count up: the same run always gives the same layout.
 
 use rerun::RecordingStream;
 use rerun::components::Color;
@@ -15,17 +14,16 @@ use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, bar, side_by_s
 use crate::frame::{Plot, Rect, RunInfo};
 use crate::record::color::PAPER;
 
-/// Domains wider than this, relative to their height, get the fields below
-/// the flow instead of beside it.
+/// Ratio of width to height above which the fields are below the flow instead of beside it.
 const WIDE: f32 = 1.3;
 
-/// Plots shown at once; the others share tabs.
+/// Number of plots shown at once; the others share tabs.
 const PLOTS_AT_ONCE: usize = 4;
 
-/// What a view of the flow shows.
+/// Content of a view of the flow.
 const FLOW: [&str; 2] = ["+ $origin/world/**", "- $origin/world/fields/**"];
 
-/// What a view of a field shows.
+/// Content of a view of a field.
 fn field_contents(paths: &Paths, name: &str) -> [String; 4] {
     [
         format!("+ {}/**", paths.field(name)),
@@ -44,22 +42,22 @@ pub(super) fn send(
     lay_out(rec, &info.recording_id, SIM_TIME, 0, |writer| writer.run(info, paths))
 }
 
-/// Sends the layout of runs side by side, on the timeline of seconds computed.
+/// Sends the layout of runs side by side on the timeline of computing time.
 pub(super) fn send_race(rec: &RecordingStream, infos: &[RunInfo]) -> Result<(), RecordError> {
     let id = infos.first().map_or("race", |info| info.recording_id.as_str());
     lay_out(rec, id, WALL_TIME, 0, |writer| writer.race(infos))
 }
 
-/// Sends the layout of runs side by side on one time cursor: the flows, and no plots.
+/// Sends the layout of runs side by side on one time cursor: the flows without plots.
 pub(super) fn send_stage(rec: &RecordingStream, infos: &[&RunInfo]) -> Result<(), RecordError> {
     let id = infos.last().map_or("stage", |info| info.recording_id.as_str());
-    // Layouts that follow each other in one viewer must not share identifiers: it would take a view
-    // for another one of the same name.
+    // Successive layouts in one viewer must not share identifiers: the viewer would confuse views
+    // with the same identifier.
     let first = id.bytes().fold(0_u64, |all, b| all.wrapping_mul(31).wrapping_add(u64::from(b)));
     lay_out(rec, id, SIM_TIME, first << 16, |writer| writer.stage(infos))
 }
 
-/// Sends the layout of a comparison: runs above, differences, curves and texts below.
+/// Sends the layout of a comparison: runs above; differences, curves and texts below.
 pub(super) fn send_comparison(
     rec: &RecordingStream,
     id: &str,
@@ -169,7 +167,8 @@ impl Writer<'_> {
         }
     }
 
-    /// The flow with its fields in tabs beside it; several runs side by side, fields below.
+    /// The flow with its fields in tabs beside it. Several runs are side by side, with the fields
+    /// below.
     fn stage(&mut self, infos: &[&RunInfo]) -> Result<Node, RecordError> {
         let alone = infos.len() == 1;
         let mut lanes = vec![];
@@ -198,12 +197,12 @@ impl Writer<'_> {
         self.stack(components::ContainerKind::Horizontal, &lanes, &[])
     }
 
-    /// The flow of a run among others, under its name.
+    /// The flow of one of several runs, titled with its name.
     fn lane(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {
         self.space(&info.name, paths, &FLOW, bar::seen(info.domain, bar::Room::Large))
     }
 
-    /// A column for each run, their first plot below.
+    /// A column for each run, with their first plot below.
     fn race(&mut self, infos: &[RunInfo]) -> Result<Node, RecordError> {
         let mut lanes = vec![];
         let mut contents = vec![];
@@ -312,7 +311,7 @@ impl Writer<'_> {
         self.row(&title, &views, domain)
     }
 
-    /// Views of one kind, beside each other; those of flat domains one below the other.
+    /// Views of one kind side by side; views of flat domains one below the other.
     fn row(&mut self, title: &str, views: &[Node], domain: Rect) -> Result<Node, RecordError> {
         let [width, height] = domain.size();
         let kind = if width > WIDE * height && views.len() < 4 {
@@ -328,7 +327,7 @@ impl Writer<'_> {
         Ok(row)
     }
 
-    /// A plot for each curve that runs have, the same one of all runs in it.
+    /// A plot for each curve, containing that curve of all runs.
     fn overlaid(&mut self, infos: &[&RunInfo]) -> Result<Vec<Node>, RecordError> {
         let mut plots: Vec<(String, String, Vec<String>)> = vec![];
         for info in infos {
@@ -351,7 +350,7 @@ impl Writer<'_> {
             .iter()
             .map(|(title, _, contents)| {
                 let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
-                // What accumulates leaves room below, what fades leaves room above.
+                // Growing curves leave space at the bottom, decaying ones at the top.
                 let corner = if title.contains("volume") {
                     components::Corner2D::RightBottom
                 } else {
@@ -399,7 +398,7 @@ impl Writer<'_> {
         self.stack(components::ContainerKind::Vertical, &views, &[]).map(Some)
     }
 
-    /// A view of a part of space.
+    /// A view of a rectangle of space.
     fn space(
         &mut self,
         name: &str,
@@ -408,7 +407,8 @@ impl Writer<'_> {
         seen: Rect,
     ) -> Result<Node, RecordError> {
         let node = self.view("2D", name, &paths.root.to_string(), contents)?;
-        // The world is drawn mirrored, so that y points up: see `Paths`.
+        // The world is drawn mirrored so that y points up: see the module documentation of
+        // `rerun_log`.
         self.property(
             &node,
             "VisualBounds2D",
@@ -520,7 +520,7 @@ impl Writer<'_> {
         Ok(node)
     }
 
-    /// The next identifier: a valid UUID of version 8, "made by the program".
+    /// The next identifier: a valid UUID of version 8 (application-defined).
     fn node(&mut self, kind: &str) -> Node {
         self.count += 1;
         let mut bytes = [0; 16];
@@ -545,7 +545,7 @@ fn range(low: f32, high: f32) -> Range1D {
     Range1D([f64::from(low), f64::from(high)])
 }
 
-/// The text with its first letter large.
+/// The text with its first letter in upper case.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     match letters.next() {

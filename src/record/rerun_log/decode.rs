@@ -1,8 +1,8 @@
-//! Files of recordings taken apart, whatever they hold.
+//! This module decodes recording files, including damaged and hostile ones.
 //!
-//! Rerun's decoder trusts what it reads: it panics over some damage, and asks for as much memory as
-//! a file claims, which ends the program. So every length is compared with the bytes that are there
-//! before the decoder sees it, and what it stumbles over all the same is caught, in silence.
+//! Rerun's decoder does not check its input: it panics on some damaged files, and allocates as much
+//! memory as a file claims to need, which aborts the program. So every length is checked against
+//! the bytes present before decoding, and other panics of the decoder are caught without output.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -21,7 +21,7 @@ use rerun::log::{Chunk, LogMsg};
 
 use super::read::ReadError;
 
-/// The messages of a recording as far as they are sound, and why its end is missing if it is.
+/// The valid messages of a recording, and the reason why its end is missing, if it is.
 pub(super) fn messages(
     path: &Path,
 ) -> Result<(impl Iterator<Item = Result<LogMsg, String>>, Option<String>), ReadError> {
@@ -50,17 +50,17 @@ pub(super) fn messages(
     Ok((messages, cut))
 }
 
-/// The chunk of a message.
+/// Decodes the chunk of a message.
 pub(super) fn chunk_of(message: &ArrowMsg) -> Result<Chunk, String> {
     calmly(|| Chunk::from_arrow_msg(message).map_err(|e| e.to_string())).flatten()
 }
 
 thread_local! {
-    /// This thread decodes: what panics is a damaged file, and told as such.
+    /// Whether this thread is decoding. A panic then means a damaged file and is reported as such.
     static DECODES: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Decodes; a panic is an error, and says nothing on its own.
+/// Runs `decode` and turns a panic into an error, without printing the panic message.
 fn calmly<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -77,13 +77,16 @@ fn calmly<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     decoded.map_err(|_| "its content is damaged".to_owned())
 }
 
-/// Kinds of messages: the end, and data in Arrow's format.
+/// Kind of the message that ends a recording.
 const END: u64 = 0;
+/// Kind of a message with data in Arrow format.
 const ARROW: u64 = 2;
+/// Largest known kind of message.
 const LAST_KIND: u64 = 3;
+/// Tolerance of the length checks (bytes).
 const SLACK: u64 = 1 << 16;
 
-/// Bytes of a recording of which every length is true.
+/// Length of the leading part of a recording in which all lengths are valid (bytes).
 fn sound_length(file: &mut (impl Read + Seek)) -> std::io::Result<u64> {
     let whole = file.seek(SeekFrom::End(0))?;
     let mut at = StreamHeader::ENCODED_SIZE_BYTES as u64;
@@ -92,7 +95,7 @@ fn sound_length(file: &mut (impl Read + Seek)) -> std::io::Result<u64> {
     loop {
         const HEADER: u64 = MessageHeader::ENCODED_SIZE_BYTES as u64;
         if whole.saturating_sub(at) < HEADER {
-            // Without an end the last message may be cut.
+            // There is no end message, so the last message may be cut.
             return Ok(whole);
         }
         let mut words = [[0; 8]; 2];
@@ -102,7 +105,7 @@ fn sound_length(file: &mut (impl Read + Seek)) -> std::io::Result<u64> {
             return Ok(at);
         }
         if kind == END {
-            // Nothing but an index follows.
+            // Only an index follows.
             return Ok(whole.min(at + HEADER + length + SLACK));
         }
         message.resize(length as usize, 0);
@@ -114,11 +117,11 @@ fn sound_length(file: &mut (impl Read + Seek)) -> std::io::Result<u64> {
     }
 }
 
-/// Whether the data of a message is as long as it says, outside and in.
+/// Whether the lengths of the data of a message are valid, both compressed and uncompressed.
 fn is_sound(message: &[u8], unpacked: &mut Vec<u8>) -> bool {
-    /// LZ4 makes its input no larger than this many times.
+    /// Largest compression ratio of LZ4.
     const LARGEST_RATIO: u64 = 255;
-    /// No picture of a run comes near this (bytes): 512 x 512 cells make 4e7.
+    /// Largest accepted message (bytes). The picture of 512 x 512 cells has 4e7.
     const LARGEST: u64 = 1 << 28;
     const LZ4: u64 = 2;
     let Some(Packed { compression, size, payload }) = Packed::read(message) else { return false };
@@ -130,12 +133,13 @@ fn is_sound(message: &[u8], unpacked: &mut Vec<u8>) -> bool {
         return false;
     }
     unpacked.resize(size as usize, 0);
-    // As the decoder does it: what is not filled stays zero.
+    // As in the decoder: bytes that are not filled stay zero.
     unpacked.fill(0);
     lz4_flex::block::decompress_into(payload, unpacked).is_ok() && arrow_is_sound(unpacked)
 }
 
-/// Whether the parts of an Arrow stream, each a description and a body, have the lengths they claim.
+/// Whether the parts of an Arrow stream, each with a header and a body, have the lengths they
+/// claim.
 fn arrow_is_sound(mut rest: &[u8]) -> bool {
     const CONTINUED: u32 = u32::MAX;
     let word = |bytes: &mut &[u8]| {
@@ -148,7 +152,7 @@ fn arrow_is_sound(mut rest: &[u8]) -> bool {
             Some(CONTINUED) => word(&mut rest),
             length => length,
         };
-        // Its end, or that of the bytes.
+        // End of the stream, or end of the bytes.
         let Some(length @ 1..) = length else { return true };
         let Some((description, after)) = rest.split_at_checked(length as usize) else {
             return false;
@@ -162,17 +166,17 @@ fn arrow_is_sound(mut rest: &[u8]) -> bool {
     }
 }
 
-/// What is packed in a message (`ArrowMsg` of Rerun's protocol, in Protocol Buffers).
+/// Payload of a message (`ArrowMsg` of Rerun's protocol, in Protocol Buffers).
 #[derive(Default)]
 struct Packed<'a> {
     compression: u64,
-    /// Bytes before they were compressed.
+    /// Uncompressed size (bytes).
     size: u64,
     payload: &'a [u8],
 }
 
 impl<'a> Packed<'a> {
-    /// `None` if it is not written as such a message.
+    /// Parses a message; `None` if it is not a valid `ArrowMsg`.
     fn read(message: &'a [u8]) -> Option<Self> {
         const COMPRESSION: u64 = 2;
         const SIZE: u64 = 3;
@@ -206,7 +210,7 @@ impl<'a> Packed<'a> {
     }
 }
 
-/// A number of seven bits a byte, the lowest first.
+/// Reads a variable-length integer: seven bits per byte, lowest first.
 fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0;
     for shift in (0..64).step_by(7) {
@@ -220,10 +224,10 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
     None
 }
 
-/// Whether a file has the footer that is written when a recording is closed. The decoder takes an
-/// end without one for an end.
+/// Whether a file has the footer that is written when a recording is closed. The decoder also
+/// accepts an end without a footer.
 fn is_closed(file: &mut File) -> std::io::Result<bool> {
-    // It ends with its two names and the number of its entries.
+    // The footer ends with two identifiers and the number of its entries.
     const TAIL: i64 = 12;
     let mut names = [0; 8];
     if file.metadata()?.len() > TAIL.unsigned_abs() {

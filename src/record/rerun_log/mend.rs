@@ -1,9 +1,9 @@
-//! Recordings taken up again: what a run left, cut or whole, up to a step.
+//! This module repairs incomplete recordings and continues recordings of earlier runs.
 //!
-//! A file whose writer was killed lacks its end, and may end in the middle of a message. What
-//! precedes that is good: [`repair`] copies it into a file that is closed in order, and
-//! [`RerunLog::resume`] copies it, up to the step of a checkpoint, into the recording that goes on.
-//! Either is written beside its place and renamed, so that no recording is ever lost on the way.
+//! A file whose writer was killed has no end and may stop in the middle of a message. The data
+//! before that is valid: [`repair`] copies it into a file that is closed properly, and
+//! [`RerunLog::resume`] copies it, up to the step of a checkpoint, into the continued recording.
+//! Both write under a temporary name and then rename, so that no recording is lost.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -19,31 +19,32 @@ use super::sinks::{Destinations, RrdFile, Saved, Sink};
 use super::{RecordError, RerunLog, STEP};
 use crate::frame::RunInfo;
 
-/// What was kept of a recording.
+/// The valid part of a recording.
 #[derive(Debug, Default)]
 pub struct Kept {
-    /// Messages of it.
+    /// Number of messages.
     pub messages: usize,
-    /// The last step.
+    /// The last step; `None` if there is none.
     pub last_step: Option<u64>,
-    /// Why the end was missing.
+    /// Reason why the end is missing; `None` if the recording is complete.
     pub cut: Option<String>,
-    /// The scene is there, and so is all else that does not change.
+    /// Whether the scene, and so all constant data, is present.
     has_scene: bool,
-    /// Entities of isolines, to be wiped if they are drawn no more.
+    /// Entities of isolines, which are cleared when they are no longer drawn.
     isolines: HashSet<EntityPath>,
 }
 
-/// A recording that goes on.
+/// A recording that is continued.
 pub struct Resumed {
+    /// The recording, open for further frames.
     pub log: RerunLog,
-    /// The last step of its past; `None` if that is lost, or was never recorded.
+    /// The last earlier step; `None` if the earlier part is lost or was never recorded.
     pub last_step: Option<u64>,
-    /// What there is to be told about its past.
+    /// Message for the user about the earlier part.
     pub notice: Option<String>,
 }
 
-/// Hands on the messages of a recording up to a step, or all of them.
+/// Passes the messages of a recording to `each`, up to step `until` or all of them.
 fn keep(path: &Path, until: Option<u64>, mut each: impl FnMut(LogMsg)) -> Result<Kept, ReadError> {
     let (messages, cut) = messages(path)?;
     let mut kept = Kept { cut, ..Kept::default() };
@@ -68,7 +69,7 @@ fn keep(path: &Path, until: Option<u64>, mut each: impl FnMut(LogMsg)) -> Result
 }
 
 impl Kept {
-    /// A message without what came after a step; `None` if nothing is left.
+    /// The part of a message up to step `until`; `None` if nothing is left.
     fn take(&mut self, message: LogMsg, until: Option<u64>) -> Result<Option<LogMsg>, String> {
         let (store, arrow) = match message {
             LogMsg::ArrowMsg(store, arrow) if store.kind() == StoreKind::Recording => {
@@ -85,7 +86,7 @@ impl Kept {
         let Some(steps) = chunk.timelines().get(&TimelineName::from(STEP)) else {
             return Ok(Some(LogMsg::ArrowMsg(store, arrow)));
         };
-        // Rows come in the order of their steps.
+        // Rows are in the order of their steps.
         let limit = until.map_or(i64::MAX, |step| i64::try_from(step).unwrap_or(i64::MAX));
         let good = steps.times_raw().iter().take_while(|&&step| step <= limit).count();
         let last = steps.times_raw().get(good.saturating_sub(1)).filter(|_| good > 0);
@@ -102,23 +103,25 @@ impl Kept {
     }
 }
 
-/// The place beside a recording where its successor is written.
+/// Temporary path beside a recording, where its successor is written.
 fn beside(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     PathBuf::from(name)
 }
 
-/// Why a recording was not repaired.
+/// Error of repairing a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RepairError {
+    /// The recording cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// The repaired recording cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
 }
 
-/// Closes a recording whose end is missing, in order; one that is whole stays as it is.
+/// Closes a recording whose end is missing. A complete recording is not changed.
 pub fn repair(path: &Path) -> Result<(Kept, Option<Saved>), RepairError> {
     let kept = keep(path, None, |_| {})?;
     if kept.cut.is_none() {
@@ -137,18 +140,18 @@ pub fn repair(path: &Path) -> Result<(Kept, Option<Saved>), RepairError> {
 }
 
 impl RerunLog {
-    /// Goes on with the recording in the first file of `sinks` after a step: what it holds of later
-    /// steps is dropped, and all other destinations are sent what it holds of earlier ones.
+    /// Continues the recording in the first file of `sinks` after a step. Its data of later steps
+    /// is removed. The data of earlier steps is also sent to all other destinations.
     pub fn resume(info: &RunInfo, sinks: &[Sink], step: u64) -> Result<Resumed, RecordError> {
         let path = sinks.iter().find_map(|sink| match sink {
             Sink::Save(path) => Some(path.clone()),
             _ => None,
         });
-        // Only a file can be taken up again, not a pipe or a device.
+        // Only a regular file can be continued, not a pipe or a device.
         let path = path.filter(|p| p.metadata().map_or(true, |m| m.is_file()));
         let Some(path) = path else {
             let log = Self::open(info, sinks)?;
-            let notice = Some(format!("what is watched begins at step {step}"));
+            let notice = Some(format!("the viewer shows the run from step {step} on"));
             return Ok(Resumed { log, last_step: None, notice });
         };
         let part = beside(&path);
@@ -159,7 +162,7 @@ impl RerunLog {
         let mut to = Destinations::open(&sinks.iter().map(aside).collect::<Vec<_>>())?;
         let rec = to.begin(&info.recording_id)?;
         let past = keep(&path, Some(step), |message| {
-            // The stream has introduced itself already.
+            // The stream has already sent its own store information.
             if !matches!(&message, LogMsg::SetStoreInfo(s)
                 if s.info.store_id.kind() == StoreKind::Recording)
             {
@@ -174,15 +177,23 @@ impl RerunLog {
                 last_step = past.last_step;
                 let last = past.last_step.unwrap_or(0);
                 (last + 1 < step).then(|| {
-                    format!("{}: lacks the steps {} to {}", path.display(), last + 1, step - 1)
+                    format!(
+                        "{}: the steps {} to {} are missing",
+                        path.display(),
+                        last + 1,
+                        step - 1
+                    )
                 })
             }
-            // There is nothing to go on with.
+            // There is no recording to continue.
             Ok(_) | Err(ReadError::Unreadable { .. } | ReadError::Open { .. }) => {
                 super::blueprint::send(&log.rec, info, &log.paths)?;
                 log.rec.send_recording_name(info.name.as_str())?;
                 log.constant(info)?;
-                Some(format!("{}: is gone; a new one begins after step {step}", path.display()))
+                Some(format!(
+                    "{}: cannot be continued; a new recording begins after step {step}",
+                    path.display()
+                ))
             }
             Err(e @ ReadError::NotOneRun { .. }) => Some(e.to_string()),
         };
@@ -194,7 +205,7 @@ impl RerunLog {
         Ok(Resumed { log, last_step, notice })
     }
 
-    /// Brings everything recorded so far to the disk.
+    /// Flushes everything recorded so far to the disk.
     pub fn settle(&mut self) -> Result<(), RecordError> {
         self.check()?;
         self.files.iter_mut().try_for_each(|file| file.settle(None))

@@ -1,4 +1,4 @@
-//! Several runs in one recording, side by side on the timeline of seconds computed: a race.
+//! This module records several runs side by side on the timeline of computing time (a race).
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use super::{Finished, RecordError, RerunLog, blueprint};
 use crate::frame::{Frame, RunInfo};
 use crate::record::color::OKABE_ITO;
 
-/// A recording of runs that are computed one after the other and watched together.
+/// A recording of runs that are computed one after the other and viewed together.
 pub struct Race {
     lanes: Vec<RerunLog>,
 }
 
 impl Race {
-    /// Starts a recording of runs, which need names of their own; the first one's identity is that
-    /// of the recording.
+    /// Starts a recording of several runs, whose names must differ. It takes the identifier of the
+    /// first run.
     pub fn open(infos: &[RunInfo], title: &str, path: &Path) -> Result<Self, RecordError> {
         let mut to = Destinations::open(&[Sink::Save(path.to_owned())])?;
         let id = infos.first().map_or("race", |info| info.recording_id.as_str());
@@ -25,7 +25,7 @@ impl Race {
         for (info, color) in infos.iter().zip(OKABE_ITO.iter().cycle()) {
             let mut lane = RerunLog::of(rec.clone(), info);
             lane.constant(info)?;
-            // Curves of several runs share a plot: a colour tells the run.
+            // The plot contains several runs: the colour identifies the run.
             lane.one_color(info, None, *color)?;
             lanes.push(lane);
         }
@@ -35,17 +35,17 @@ impl Race {
         Ok(Self { lanes })
     }
 
-    /// Records an instant of one run.
+    /// Records a frame of the run with index `lane`.
     pub fn frame(&mut self, lane: usize, frame: &Frame) -> Result<(), RecordError> {
         self.lanes.get_mut(lane).map_or(Ok(()), |lane| lane.frame(frame))
     }
 
-    /// Ends the recording; `None` if nothing raced.
+    /// Ends the recording; `None` if there are no runs.
     pub fn finish(mut self) -> Result<Option<Finished>, RecordError> {
         if self.lanes.is_empty() {
             return Ok(None);
         }
-        // The first one owns the file, and closes it when the others are done.
+        // The first log owns the file, and closes it after the others are dropped.
         let first = self.lanes.remove(0);
         drop(self.lanes);
         first.finish().map(Some)

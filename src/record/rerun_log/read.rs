@@ -1,4 +1,5 @@
-//! Recordings read back: the scene, the curves and the numbers of the fields of one run.
+//! This module reads back the scene, the curves, the particles and the field values of a recorded
+//! run.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -11,58 +12,59 @@ use super::decode::{chunk_of, messages};
 use super::{RUNS, SIM_TIME, WALL_TIME};
 use crate::frame::{GridField, ParticleSnapshot, Rect};
 
-/// Why a recording cannot be read.
+/// Error of reading a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file cannot be opened.
     #[error("{}: cannot be read: {source}", path.display())]
     Open {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// It is another kind of file, or cut before anything was in it.
-    #[error("{}: is no recording that can be read: {cause}; expected an .rrd file of a run", path.display())]
+    /// The file is not a recording, or it was cut before its first data.
+    #[error("{}: is not a readable recording: {cause}; expected an .rrd file of a run", path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the decoder says.
+        /// Cause, as reported by the decoder.
         cause: String,
     },
-    /// A recording, but not of one run.
+    /// The recording does not contain exactly one run.
     #[error(
         "{}: holds {found}; a comparison takes recordings of one run each", path.display()
     )]
     NotOneRun {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it holds instead.
+        /// Content of the file.
         found: String,
     },
 }
 
-/// One number of a curve.
+/// One value of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Simulated time (s).
     pub time_s: f64,
-    /// Seconds computed so far.
+    /// Computing time so far (s).
     pub wall_s: f64,
-    /// The number.
+    /// Value, in the unit of the curve.
     pub value: f64,
 }
 
-/// A recording of one run, read back.
+/// A recording of one run that was read.
 pub struct Recorded {
-    /// The run's name in the recording.
+    /// Name of the run in the recording.
     pub run: String,
-    /// Why the end is missing, if the file is cut.
+    /// Reason why the end is missing, if the file is cut.
     pub cut: Option<String>,
+    /// All chunks of the recording.
     pub(super) chunks: Vec<Chunk>,
 }
 
-/// The parts of a chunk's path below its run; `None` for what belongs to no run.
+/// Name of the run of a chunk and the parts of its path below the run; `None` for other chunks.
 pub(super) fn below_run(chunk: &Chunk) -> Option<(String, Vec<String>)> {
     let mut parts = chunk.entity_path().iter().map(|part| part.unescaped_str().to_owned());
     (parts.next()? == RUNS).then_some(())?;
@@ -70,7 +72,7 @@ pub(super) fn below_run(chunk: &Chunk) -> Option<(String, Vec<String>)> {
 }
 
 impl Recorded {
-    /// Reads a file. One that is cut gives what precedes the cut.
+    /// Reads a file. Of a cut file, it reads everything before the cut.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let unreadable = |cause: String| ReadError::Unreadable { path: path.to_owned(), cause };
         let (messages, mut cut) = messages(path)?;
@@ -110,24 +112,24 @@ impl Recorded {
         }
     }
 
-    /// Chunks of the run, with their paths below it.
+    /// Chunks of the run, with their paths below the run.
     pub(super) fn of_run(&self) -> impl Iterator<Item = (&Chunk, Vec<String>)> {
         self.chunks.iter().filter_map(|chunk| Some((chunk, below_run(chunk)?.1)))
     }
 
-    /// The resolved scene, as TOML.
+    /// The resolved scene, as TOML; `None` if it is missing.
     pub fn scene_toml(&self) -> Option<String> {
         let component = archetypes::TextDocument::descriptor_text().component;
         self.of_run().filter(|(_, path)| *path == ["scene"]).find_map(|(chunk, _)| {
             let text = chunk.iter_slices::<String>(component).next()?.first()?.to_string();
-            // It is fenced for the viewer.
+            // The recording contains the scene inside a Markdown fence.
             let fence = text.chars().take_while(|&c| c == '`').collect::<String>();
             let inside = text.strip_prefix(fence.as_str())?.split_once('\n')?.1;
             Some(inside.trim_end().strip_suffix(fence.as_str())?.to_owned())
         })
     }
 
-    /// All curves, by the path that their scalars have; without logarithms.
+    /// All curves by the path of their scalar, without the logarithms. Samples are ordered by time.
     pub fn curves(&self) -> BTreeMap<String, Vec<Sample>> {
         let component = archetypes::Scalars::descriptor_scalars().component;
         let mut curves: BTreeMap<String, Vec<Sample>> = BTreeMap::new();
@@ -154,12 +156,12 @@ impl Recorded {
         curves
     }
 
-    /// The particles of each picture, by time.
+    /// The particles of each picture, with its time (s), in order.
     pub fn particles(&self) -> Vec<(f64, ParticleSnapshot)> {
         let positions = archetypes::Points2D::descriptor_positions().component;
         let classes = archetypes::Points2D::descriptor_class_ids().component;
         let mut pictures: Vec<(f64, Vec<[f32; 2]>)> = vec![];
-        // Written only where they change.
+        // Classes are recorded only when they change.
         let mut changes: Vec<(f64, Vec<u16>)> = vec![];
         for (chunk, _) in self.of_run().filter(|(_, path)| *path == ["world", "particles"]) {
             let times = seconds(chunk, SIM_TIME, positions);
@@ -180,7 +182,7 @@ impl Recorded {
         pictures.into_iter().map(snapshot).collect()
     }
 
-    /// The pictures of each field that fills `domain`, by time.
+    /// The snapshots of each field on `domain`, with their time (s), in order.
     pub fn fields(&self, domain: Rect) -> BTreeMap<String, Vec<(f64, GridField)>> {
         let component = archetypes::Tensor::descriptor_data().component;
         let mut fields: BTreeMap<String, Vec<(f64, GridField)>> = BTreeMap::new();
@@ -206,7 +208,7 @@ impl Recorded {
     }
 }
 
-/// Seconds on a timeline of the rows that hold a component.
+/// Times of the rows that hold a component, on one timeline (s).
 fn seconds(
     chunk: &Chunk,
     timeline: &'static str,

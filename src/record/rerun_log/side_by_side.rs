@@ -1,5 +1,5 @@
-//! Recordings of several runs in one, under one time cursor: a view for each, curves overlaid,
-//! differences of their fields.
+//! This module combines the recordings of several runs in one recording with one time cursor: a
+//! view of each run, overlaid curves, and differences of the fields.
 
 use rerun::{EntityPath, EntityPathPart, archetypes};
 
@@ -8,42 +8,43 @@ use super::{Finished, Paths, RecordError, Recorded, RerunLog, SIM_TIME, blueprin
 use crate::frame::{GridField, Rect, RunInfo};
 use crate::record::color::OKABE_ITO;
 
-/// The next instant: what is there at an end stays visible at the end.
+/// Delay of the clear after the last difference (s), so that the difference at the end stays
+/// visible.
 const AFTER: f64 = 1e-9;
 
-/// Where differences live.
+/// Root path of the entities of differences.
 const DIFFERENCES: &str = "differences";
 
-/// A run to be shown, under the name that its [`RunInfo`] has.
+/// A run to be shown, under the name in its [`RunInfo`].
 pub struct RecordedRun<'a> {
-    /// What does not change during the run.
+    /// Constant part of the recording.
     pub info: RunInfo,
-    /// What changes.
+    /// The recording.
     pub recorded: &'a Recorded,
 }
 
-/// What one run has less what another one has.
+/// Fields of one run minus those of another run.
 pub struct Difference {
-    /// Names both, the domain they share, walls, and the fields.
+    /// Names of both runs, their common domain, walls, and the fields.
     pub info: RunInfo,
-    /// Fields by time (s).
+    /// Time (s) and fields at that time.
     pub frames: Vec<(f64, Vec<GridField>)>,
-    /// From where on there is none, if a run goes on after the other's end (s).
+    /// Time after which there is no difference because one of the runs has ended (s).
     pub ends: Option<f64>,
 }
 
-/// Texts and identity of a comparison.
+/// Identifier, title and texts of a comparison.
 pub struct SideBySide<'a> {
-    /// Identity of the recording.
+    /// Identifier of the recording.
     pub id: &'a str,
-    /// Its title.
+    /// Title of the recording.
     pub title: &'a str,
-    /// Titles and Markdown.
+    /// Title and Markdown of each text panel.
     pub texts: &'a [(&'a str, String)],
 }
 
 impl SideBySide<'_> {
-    /// Writes everything; it is served, if asked for, until the result is dropped.
+    /// Writes the recording. If a page is served, it is served until the result is dropped.
     pub fn write(
         &self,
         lanes: &[RecordedRun],
@@ -71,7 +72,7 @@ impl SideBySide<'_> {
         for (lane, color) in lanes.iter().zip(OKABE_ITO.iter().cycle()) {
             let log = RerunLog::of(rec.clone(), &lane.info);
             for (chunk, path) in lane.recorded.of_run() {
-                // Numbers of fields are for comparing, which is done.
+                // Field values are needed only for the comparison, which is complete.
                 if path.last().is_some_and(|part| part == "values") {
                     continue;
                 }
@@ -113,7 +114,7 @@ fn text_path(title: &str) -> EntityPath {
     EntityPath::new(["comparison", title].map(|part| EntityPathPart::new(part.to_owned())).to_vec())
 }
 
-/// What all runs are looked at in.
+/// The bounding rectangle of the domains of all runs (m).
 pub(super) fn bounds(infos: &[&RunInfo]) -> Rect {
     let domains = infos.iter().map(|info| info.domain);
     domains.reduce(Rect::around).unwrap_or_default()

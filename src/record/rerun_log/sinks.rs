@@ -1,8 +1,7 @@
-//! Where a recording goes, and whether it got there.
+//! This module implements the destinations of a recording and detects their errors.
 //!
-//! Rerun logs asynchronously and tells nobody when the disk is full. Here each
-//! destination keeps its first fault, and a fault is an error of the recording
-//! only if nothing else still receives it.
+//! Rerun logs asynchronously and does not report a full disk. Here each destination keeps its first
+//! error. An error of a viewer is an error of the recording only if no other destination is left.
 
 use std::fs::File;
 use std::net::{Ipv4Addr, TcpListener};
@@ -21,57 +20,58 @@ use rerun::RecordingStream;
 
 use super::{APPLICATION, FILE_TICK, RecordError};
 
-/// How long a viewer may take to swallow what was sent before it is given up.
+/// Time after which a viewer that accepts no data is given up.
 const VIEWER_PATIENCE: Duration = Duration::from_secs(5);
 
-/// History a server keeps for viewers that connect late.
+/// Size of the history that a server keeps for viewers that connect late (bytes).
 ///
-/// Half of what a 1 GiB process may spend: the same frames are held once more
-/// by the viewer itself, often on the same machine.
+/// It is half of the memory of a 1 GiB process: the viewer, often on the same machine, holds the
+/// same frames once more.
 const SERVER_HISTORY_BYTES: u64 = 512 * 1024 * 1024;
 
-/// Everything that is served is served to this machine only.
+/// Address to serve on: only this machine can connect.
 const HOST: Ipv4Addr = Ipv4Addr::LOCALHOST;
 
-/// A destination of the recording.
+/// A destination of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sink {
     /// An `.rrd` file.
     Save(PathBuf),
-    /// A viewer that already listens, such as `rerun+http://127.0.0.1:9876/proxy`.
+    /// A running viewer, by its address, such as `rerun+http://127.0.0.1:9876/proxy`.
     Connect(String),
-    /// A page served from this process, to this machine only.
+    /// A page served by this process, to this machine only.
     Serve {
-        /// Port of the page; 0 takes any free one.
+        /// Port of the page; 0 takes any free port.
         web_port: u16,
-        /// Port of the data; 0 takes any free one.
+        /// Port of the data; 0 takes any free port.
         grpc_port: u16,
     },
-    /// The data alone, served to viewers on this machine that are told its address.
+    /// The data alone, served to viewers on this machine that know its address.
     Stream,
-    /// The `rerun` viewer found on the path, started now.
+    /// The `rerun` viewer found on `PATH`, started now.
     Spawn,
 }
 
-/// First fault of a destination, shared between its sink and the recorder.
+/// First error of a destination, shared between its sink and the recorder.
 type Fault = Arc<Mutex<Option<String>>>;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// An `.rrd` file. Rerun's own `FileSink` writes the same bytes, but only logs
-/// why it failed.
+/// An `.rrd` file. Rerun's own `FileSink` writes the same bytes, but reports errors only in the
+/// log.
 #[derive(Clone)]
 pub(super) struct RrdFile {
     path: PathBuf,
     encoder: Arc<Mutex<Encoder<File>>>,
-    /// The same file, to bring it to the disk.
+    /// The same file, used to flush it to the disk.
     handle: Arc<File>,
     fault: Fault,
 }
 
 impl RrdFile {
+    /// Creates the file and writes its header.
     pub(super) fn create(path: &Path) -> Result<Self, RecordError> {
         let failed = |cause: String| RecordError::Write { path: path.to_owned(), cause };
         let file = File::create(path).map_err(|e| failed(e.to_string()))?;
@@ -87,6 +87,7 @@ impl RrdFile {
         })
     }
 
+    /// The first error of the file, if any.
     pub(super) fn check(&self) -> Result<(), RecordError> {
         match lock(&self.fault).clone() {
             None => Ok(()),
@@ -94,12 +95,15 @@ impl RrdFile {
         }
     }
 
-    /// The error of a file that takes no more data, without saying why.
+    /// The error of a file that accepts no more data without giving a cause.
     pub(super) fn late(&self) -> RecordError {
-        RecordError::Write { path: self.path.clone(), cause: "the disk does not answer".to_owned() }
+        RecordError::Write {
+            path: self.path.clone(),
+            cause: "the disk does not respond".to_owned(),
+        }
     }
 
-    /// Writes the footer. To be called when nothing more will be sent.
+    /// Writes the footer. It must be called after the last message.
     pub(super) fn finish(&self) -> Result<Saved, RecordError> {
         self.check()?;
         let failed = |cause: String| RecordError::Write { path: self.path.clone(), cause };
@@ -109,13 +113,13 @@ impl RrdFile {
         self.finished()
     }
 
-    /// The file as it is now.
+    /// Path and size of the file as it is now.
     pub(super) fn finished(&self) -> Result<Saved, RecordError> {
         let size = std::fs::metadata(&self.path).map_err(|e| self.failed(&e.to_string()))?;
         Ok(Saved { path: self.path.clone(), bytes: size.len() })
     }
 
-    /// Brings what was sent to the disk, and the file to its final place.
+    /// Flushes the file to the disk, and moves it to `place` if given.
     pub(super) fn settle(&mut self, place: Option<&Path>) -> Result<(), RecordError> {
         self.check()?;
         let encoder = lock(&self.encoder).flush_blocking();
@@ -154,13 +158,13 @@ impl LogSink for RrdFile {
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Saved {
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
-    /// How large it is.
+    /// Size (bytes).
     pub bytes: u64,
 }
 
-/// A viewer, near or far. After its first fault nothing more is sent to it.
+/// A viewer. After its first error nothing more is sent to it.
 #[derive(Clone)]
 pub(super) struct Live {
     name: String,
@@ -168,6 +172,7 @@ pub(super) struct Live {
 }
 
 impl Live {
+    /// The first error of the viewer, if any.
     pub(super) fn check(&self) -> Result<(), RecordError> {
         match lock(&self.fault).clone() {
             None => Ok(()),
@@ -176,34 +181,36 @@ impl Live {
     }
 }
 
-/// What is handed to the thread of a viewer.
+/// Message to the thread of a viewer.
 enum Parcel {
     Message(LogMsg),
-    /// Wait until everything before it has left; then say so.
+    /// Wait at most this long until everything before it has been sent, then reply.
     Flush(Duration, Sender<Result<(), SinkFlushError>>),
 }
 
-/// Parcels that may wait beside those that Rerun's own queue holds.
+/// Number of messages that may wait, in addition to Rerun's own queue.
 const PARCELS: usize = 8;
 
-/// Rerun's sinks block for as long as a viewer takes nothing, which may be for ever. This one hands
-/// what it is sent to a thread of its own, and gives a viewer up that takes nothing for
-/// [`VIEWER_PATIENCE`]. A viewer that is merely slow slows the logger, whose policy decides what
-/// that means for the run.
+/// A sink for viewers. Rerun's own sinks block as long as a viewer accepts no data, possibly for
+/// ever. This one passes messages to a thread of its own, and gives up a viewer that accepts
+/// nothing for [`VIEWER_PATIENCE`]. A slow viewer slows down the logger, whose [`Backpressure`]
+/// policy decides the effect on the run.
+///
+/// [`Backpressure`]: crate::record::logger::Backpressure
 struct LiveSink {
     fault: Fault,
     line: Sender<Parcel>,
 }
 
 impl LiveSink {
-    /// Starts the thread; it ends when this is dropped and the viewer has taken what waits.
+    /// Starts the thread. It ends after this sink is dropped and the waiting messages are sent.
     fn start(fault: Fault, inner: Box<dyn LogSink>) -> std::io::Result<LiveSink> {
         let (line, parcels) = bounded(PARCELS);
         std::thread::Builder::new().name("viewer".into()).spawn(move || {
             for parcel in parcels {
                 match parcel {
                     Parcel::Message(message) => inner.send(message),
-                    // Nobody waits any more if this fails.
+                    // If this fails, the receiver has gone and needs no reply.
                     Parcel::Flush(timeout, done) => {
                         let _ = done.send(inner.flush_blocking(timeout));
                     }
@@ -216,11 +223,11 @@ impl LiveSink {
     fn hand_over(&self, parcel: Parcel, timeout: Duration) -> Result<(), SinkFlushError> {
         self.line.send_timeout(parcel, timeout).map_err(|_| {
             let seconds = timeout.as_secs_f64();
-            SinkFlushError::failed(format!("it took nothing of what was sent for {seconds} s"))
+            SinkFlushError::failed(format!("it accepted no data for {seconds} s"))
         })
     }
 
-    /// The first fault stays.
+    /// Stores an error unless there is one already.
     fn note(&self, error: &SinkFlushError) {
         lock(&self.fault).get_or_insert_with(|| error.to_string());
     }
@@ -251,28 +258,33 @@ impl LogSink for LiveSink {
     }
 }
 
-/// A page that shows the recording in a browser, for as long as this lives.
+/// A page that shows the recording in a browser; it is served until this value is dropped.
 pub(super) struct Page {
+    /// Address of the page, or of the data alone.
     pub(super) url: String,
-    /// Stops serving when dropped; absent where the data alone is served.
+    /// Server of the page, which stops when dropped; `None` if only the data is served.
     _server: Option<Box<dyn std::any::Any + Send>>,
 }
 
 /// All destinations of one recording.
 #[derive(Default)]
 pub(super) struct Destinations {
+    /// Sinks of all destinations.
     pub(super) sinks: Vec<Box<dyn LogSink>>,
+    /// Files among the destinations.
     pub(super) files: Vec<RrdFile>,
+    /// Viewers among the destinations.
     pub(super) viewers: Vec<Live>,
+    /// The served page, if any.
     pub(super) page: Option<Page>,
 }
 
 impl Destinations {
-    /// Starts a recording that goes to all of them.
+    /// Starts a stream to all destinations.
     pub(super) fn begin(&mut self, id: &str) -> Result<RecordingStream, RecordError> {
         let mut builder = rerun::RecordingStreamBuilder::new(APPLICATION)
             .recording_id(id)
-            // The RERUN environment variable must not silence a recording that was asked for.
+            // The RERUN environment variable must not disable a requested recording.
             .enabled(true);
         if self.viewers.is_empty() {
             builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
@@ -286,6 +298,7 @@ impl Destinations {
         Ok(rec)
     }
 
+    /// Opens all destinations.
     pub(super) fn open(sinks: &[Sink]) -> Result<Self, RecordError> {
         let mut all = Self::default();
         for sink in sinks {
@@ -362,7 +375,7 @@ impl Destinations {
         Ok(())
     }
 
-    /// Serves the data; viewers that come late get what was sent before.
+    /// Serves the data. Viewers that connect late receive the history.
     fn data(&mut self, port: u16, name: String) -> Result<(), RecordError> {
         let sink = rerun::grpc_server::GrpcServerSink::new(
             &HOST.to_string(),
@@ -377,16 +390,16 @@ impl Destinations {
     }
 }
 
-/// Makes sure that ports of this machine are free, and finds some for 0.
+/// Checks that ports of this machine are free, and chooses free ones for 0.
 ///
-/// Rerun's server thread would report a busy port to nobody.
+/// Rerun's server thread does not report a port that is in use.
 fn claim(ports: [u16; 2]) -> Result<[u16; 2], RecordError> {
     let bind = |port| {
         TcpListener::bind((HOST, port))
             .and_then(|listener| Ok((listener.local_addr()?.port(), listener)))
             .map_err(|source| RecordError::Port { port, source })
     };
-    // Both are held until both are known, so that they differ.
+    // Both listeners are held until both ports are known, so that they differ.
     let (first, second) = (bind(ports[0])?, bind(ports[1])?);
     Ok([first.0, second.0])
 }

@@ -1,4 +1,4 @@
-//! A run and those that were kept before it, side by side on one time cursor.
+//! This module records a running simulation beside pinned earlier runs on one time cursor.
 
 use std::sync::Arc;
 
@@ -6,16 +6,16 @@ use super::sinks::{Destinations, Sink};
 use super::{RecordError, RerunLog, blueprint};
 use crate::frame::{Frame, RunInfo};
 
-/// A run and what there is of it so far.
+/// A run and its frames so far.
 pub struct Lane<'a> {
-    /// Its name must differ from those beside it.
+    /// Constant part of the recording. Its name must differ from those of the other runs.
     pub info: &'a RunInfo,
-    /// In order.
+    /// Frames in order.
     pub frames: &'a [Arc<Frame>],
 }
 
 impl RerunLog {
-    /// Starts a recording of a run that goes on, beside others that do not.
+    /// Starts a recording of a running simulation beside runs that have ended.
     pub fn beside(others: &[Lane], run: &Lane, sinks: &[Sink]) -> Result<Self, RecordError> {
         let mut to = Destinations::open(sinks)?;
         let rec = to.begin(&run.info.recording_id)?;

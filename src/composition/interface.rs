@@ -14,9 +14,9 @@
 //! difference of the eigenvalues tells how much of a direction it has: one for an edge or a sheet,
 //! nothing for a drop.
 //!
-//! Stiff sheets below a cell are told by [`minority`](super::minority) and have straight rims.
+//! Stiff sheets below a cell are told by [`features`](super::features) and have straight rims.
 
-use super::minority::{Labelled, Strip};
+use super::features::{Labelled, Strip};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_6X6, SUBPOINTS};

@@ -13,8 +13,9 @@
 //! `eta_c <= eta` have no such part. The error made is that of `e (s - Ps)(s~ - Ps~)`, of fourth
 //! order where `s` is smooth. A weak point of a cut cell weighs little in `P`.
 
-use super::element::{LOCAL, Matrix, Nodal, PointShape};
-use super::quadrature::Quadrature;
+use crate::solve::element::{LOCAL, Matrix, Nodal, PointShape};
+use crate::solve::quadrature::Quadrature;
+use crate::space::measure::CellMeasure;
 use crate::space::shape::NODES;
 use std::cell::RefCell;
 
@@ -24,7 +25,7 @@ const LEAST_PART: f64 = 1e-10;
 
 /// The projected coupling of a cell: `sum_k b_k b_k'`.
 #[derive(Default)]
-pub struct SpinModes {
+pub struct RotationModes {
     modes: [[f64; LOCAL]; 3],
     /// Of those, that are there.
     count: usize,
@@ -49,28 +50,28 @@ struct Point {
     spin: [f64; LOCAL],
 }
 
-impl SpinModes {
+impl RotationModes {
     /// Of a cell with rotation; `None` where no point has an excess.
-    pub fn new(quadrature: &Quadrature, cell: usize, size: [f64; 2]) -> Option<Self> {
-        let area = size[0] * size[1];
+    pub fn new(quadrature: &Quadrature, cell: usize, measure: CellMeasure) -> Option<Self> {
+        let volume = measure.volume();
         ROOM.with_borrow_mut(|Room { points, basis }| {
             points.clear();
             quadrature.for_points(cell, |p, shape| {
                 let excess = p.law.excess_coupling();
                 // The part of the shear viscosity of rounding is none.
                 if excess > LEAST_PART * p.law.coupling {
-                    let s = PointShape::new(shape, size);
+                    let s = PointShape::new(shape, measure.size);
                     let mut spin = [0.0; LOCAL];
                     for a in 0..NODES {
                         spin[a] = -0.5 * s.gy[a];
                         spin[NODES + a] = 0.5 * s.gx[a];
                         spin[2 * NODES + a] = -s.n[a];
                     }
-                    let weight = 4.0 * excess * p.weight * area;
+                    let weight = 4.0 * excess * p.weight * volume;
                     points.push(Point { weight, linear: [1.0, p.r[0], p.r[1]], spin });
                 }
             });
-            (!points.is_empty()).then(|| SpinModes::of(points, basis))
+            (!points.is_empty()).then(|| RotationModes::of(points, basis))
         })
     }
 
@@ -79,7 +80,7 @@ impl SpinModes {
         let product = |a: &[f64], b: &[f64]| -> f64 {
             points.iter().zip(a.iter().zip(b)).map(|(p, (a, b))| p.weight * a * b).sum()
         };
-        let mut out = SpinModes::default();
+        let mut out = RotationModes::default();
         for k in 0..3 {
             let (known, rest) = basis.split_at_mut(out.count);
             let f = &mut rest[0];
@@ -159,7 +160,7 @@ mod tests {
     #[test]
     fn a_linear_relative_spin_keeps_all_its_power() {
         let points = points(|g| 0.3 + 0.1 * g as f64);
-        let modes = SpinModes::of(&points, &mut Default::default());
+        let modes = RotationModes::of(&points, &mut Default::default());
         // u = -y^2, w = 0.4 x: spin y, relative spin y - 0.4 x
         let u: Nodal<3> = std::array::from_fn(|a| {
             let (x, y) = ((a % 3) as f64 * 0.5 * SIZE[0], (a / 3) as f64 * 0.5 * SIZE[1]);
@@ -180,7 +181,7 @@ mod tests {
     fn points_without_weight_leave_fewer_functions() {
         // One column of points tells nothing about slopes along x.
         let column = points(|_| 1.0).into_iter().skip(1).step_by(3).collect::<Vec<_>>();
-        let count = |points: &[Point]| SpinModes::of(points, &mut Default::default()).count;
+        let count = |points: &[Point]| RotationModes::of(points, &mut Default::default()).count;
         assert_eq!(count(&column), 2);
         assert_eq!(count(&column[..1]), 1);
         assert_eq!(count(&points(|g| 10f64.powi(-(g as i32)))), 3);

@@ -31,20 +31,18 @@
 //! of the order `rho g h^2/eta_weak`: heavy fluid at rest below one a million times thinner, in steps
 //! of a thousandth of its own relaxation time.
 
-use super::weight::Weight;
+use super::{CellFace, CellTerm, FaceTerm};
+use crate::solve::density::Density;
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Face;
 use crate::space::shape::NODES;
 
 /// Mass of the quadratic functions on a line, over its length.
-const LINE_MASS: [[f64; 3]; 3] = [
+pub const LINE_MASS: [[f64; 3]; 3] = [
     [4.0 / 30.0, 2.0 / 30.0, -1.0 / 30.0],
     [2.0 / 30.0, 16.0 / 30.0, 2.0 / 30.0],
     [-1.0 / 30.0, 2.0 / 30.0, 4.0 / 30.0],
 ];
-/// Nodes of a cell on its right and on its upper side.
-pub const SIDE_NODES: [[usize; 3]; 2] = [[2, 5, 8], [6, 7, 8]];
-
 /// Jumps smaller than this share of the largest density are rounding.
 const LEAST_JUMP: f64 = 1e-13;
 
@@ -68,35 +66,27 @@ pub struct Ahead {
     pub weakest: f64,
 }
 
-/// The term of one face.
-#[derive(Clone, Copy, Debug)]
-pub struct FaceTerm {
-    /// The cell to the left or below.
-    pub cell: usize,
-    /// 0: its right side; 1: its upper one.
-    pub normal: usize,
-    /// Force per velocity: `theta dt c` integrated over the face.
-    strength: f64,
-}
-
 /// The terms of all faces that have one.
 #[derive(Clone, Debug, Default)]
 pub struct Restoring {
-    pub faces: Vec<FaceTerm>,
+    faces: Vec<CellFace>,
+    /// Force per velocity of each face: `theta dt c` integrated over it.
+    strength: Vec<f64>,
     /// Force per velocity, over each cell; empty if there are no terms.
     cells: Vec<f64>,
     /// `e`
     direction: [f64; 2],
     /// `u_before` at the nodes.
     before: Vec<[f64; 2]>,
-    /// Mean of each cell.
-    density: Vec<f64>,
+    /// Mean density of each cell.
+    mean: Vec<f64>,
 }
 
 impl Restoring {
     /// No terms.
     pub fn clear(&mut self) {
         self.faces.clear();
+        self.strength.clear();
         self.cells.clear();
     }
 
@@ -105,7 +95,7 @@ impl Restoring {
         &mut self,
         mesh: &Mesh,
         faces: &[Face],
-        weight: &Weight,
+        density: &Density,
         Ahead { gravity, time: ahead, weakest }: Ahead,
         before: impl Iterator<Item = [f64; 2]>,
     ) {
@@ -117,47 +107,52 @@ impl Restoring {
             return;
         }
         self.direction = gravity.map(|c| c / g);
-        self.density.clear();
-        self.density.extend((0..mesh.cells()).map(|cell| weight.mean(cell)));
-        let density = &self.density;
-        let least = LEAST_JUMP * density.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
+        self.mean.clear();
+        self.mean.extend((0..mesh.cells()).map(|cell| density.mean(cell)));
+        let mean = &self.mean;
+        let least = LEAST_JUMP * mean.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
         for face in faces {
             let [a, b] = face.cells.map(|c| c as usize);
-            let jump = (density[b] - density[a]) * self.direction[face.normal];
+            let jump = (mean[b] - mean[a]) * self.direction[face.normal];
             if jump > least {
-                let length = mesh.cell_size(a)[1 - face.normal];
-                let strength = ahead * g * jump * length;
-                self.faces.push(FaceTerm { cell: a, normal: face.normal, strength });
+                let strength = ahead * g * jump * mesh.face_area(a, face.normal);
+                self.faces.push(CellFace { cell: a, side: 2 * face.normal + 1 });
+                self.strength.push(strength);
             }
         }
         let direction = self.direction;
         self.cells.extend((0..mesh.cells()).map(|cell| {
-            let ([hx, hy], slope) = (mesh.cell_size(cell), weight.slope(cell));
+            let (measure, slope) = (mesh.cell_measure(cell), density.slope(cell));
+            let [hx, hy] = measure.size;
             let [x, y] = [slope[0] * direction[0], slope[1] * direction[1]];
             let growth = 2.0 * (x / hx + y / hy);
             if x + y <= least {
                 return 0.0;
             }
             // Faces alone have the whole gradient: at short steps these terms would count it twice.
-            let restoring = SUBCELL_STRENGTH * ahead * g * growth * hx * hy;
+            let restoring = measure.times(SUBCELL_STRENGTH * ahead * g * growth);
             restoring * restoring / (restoring + SUBCELL_STEP * weakest)
         }));
     }
 
     /// Force per velocity over a cell; zero where it has no term of its own.
-    pub fn cell_strength(&self, cell: usize) -> f64 {
+    fn cell_strength(&self, cell: usize) -> f64 {
         self.cells.get(cell).copied().unwrap_or(0.0)
     }
+}
 
-    /// Entry of a cell's matrix for nodes `a`, `b` and components `c`, `d`.
-    pub fn cell_entry(&self, cell: usize, [a, b]: [usize; 2], [c, d]: [usize; 2]) -> f64 {
+impl CellTerm for Restoring {
+    fn acts_on(&self, cell: usize) -> bool {
+        self.cell_strength(cell) > 0.0
+    }
+
+    fn entry(&self, cell: usize, [a, b]: [usize; 2], [c, d]: [usize; 2]) -> f64 {
         let mass = LINE_MASS[a % 3][b % 3] * LINE_MASS[a / 3][b / 3];
         // Both components alike.
         if c == d { self.cell_strength(cell) * mass } else { 0.0 }
     }
 
-    /// Forces on the nodes of a cell, and their power, as [`Restoring::force`].
-    pub fn cell_force(
+    fn force(
         &self,
         cell: usize,
         nodes: &[usize; NODES],
@@ -176,20 +171,18 @@ impl Restoring {
         });
         (force, power)
     }
+}
 
-    /// Entry of the matrix for nodes `k`, `l` of a face and components `c`, `d`.
-    pub fn entry(&self, face: &FaceTerm, [k, l]: [usize; 2], [c, d]: [usize; 2]) -> f64 {
-        face.strength * LINE_MASS[k][l] * self.direction[c] * self.direction[d]
+impl FaceTerm for Restoring {
+    fn faces(&self) -> &[CellFace] {
+        &self.faces
     }
 
-    /// Forces on the nodes of a face, by node and component, where the velocity is `u` at the
-    /// nodes `nodes`, and their power (what they take from the flow).
-    pub fn force(
-        &self,
-        face: &FaceTerm,
-        nodes: [usize; 3],
-        u: [[f64; 2]; 3],
-    ) -> ([[f64; 2]; 3], f64) {
+    fn entry(&self, face: usize, [k, l]: [usize; 2], [c, d]: [usize; 2]) -> f64 {
+        self.strength[face] * LINE_MASS[k][l] * self.direction[c] * self.direction[d]
+    }
+
+    fn force(&self, face: usize, nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], f64) {
         let [ex, ey] = self.direction;
         let along = u.map(|u| u[0] * ex + u[1] * ey);
         let change: [f64; 3] = std::array::from_fn(|k| {
@@ -198,7 +191,7 @@ impl Restoring {
         });
         let mut power = 0.0;
         let force = std::array::from_fn(|k| {
-            let f = face.strength * (0..3).map(|l| LINE_MASS[k][l] * change[l]).sum::<f64>();
+            let f = self.strength[face] * (0..3).map(|l| LINE_MASS[k][l] * change[l]).sum::<f64>();
             power += f * along[k];
             [-f * ex, -f * ey]
         });

@@ -28,7 +28,8 @@
 //! `rho_m` is a quadratic fit where particles carry their
 //! density; those of neighbouring cells help a little.
 
-use super::quadrature::{Content, Quadrature};
+use super::quadrature::Quadrature;
+use crate::composition::Content;
 use crate::plan::material::Material;
 use crate::space::fit::{Degree, Fit};
 use crate::space::mesh::Mesh;
@@ -36,7 +37,7 @@ use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
 use crate::space::shape::GAUSS_3X3;
 
-/// Weight of a neighbour's particle in a fit beside the cell's own, by its reference coordinates.
+/// Density of a neighbour's particle in a fit beside the cell's own, by its reference coordinates.
 ///
 /// Sixteen particles at random places determine six coefficients badly now and then; a few from
 /// next door, however lightly they count, mend that. On the steady vortex at 32 cells with random
@@ -47,7 +48,7 @@ fn lent([x, y]: [f64; 2]) -> f64 {
 }
 
 /// Densities at the 3 x 3 Gauss points of each cell.
-pub struct Weight {
+pub struct Density {
     neighbours: Neighbours,
     at_gauss: Vec<[f64; 9]>,
     parts: Vec<Part>,
@@ -62,9 +63,9 @@ struct Part {
     density: Fit,
 }
 
-impl Weight {
+impl Density {
     pub fn new(mesh: &Mesh, neighbours: Neighbours, materials: usize) -> Self {
-        Weight {
+        Density {
             neighbours,
             at_gauss: vec![[0.0; 9]; mesh.cells()],
             parts: vec![Part::default(); materials],
@@ -85,7 +86,7 @@ impl Weight {
                 Content::Mixed => {
                     self.gather(mesh, cell, particles, materials);
                     self.help(mesh, cell, particles, materials);
-                    self.mixed(materials, quadrature.factors())
+                    self.mixed(materials, quadrature.composition().factors())
                 }
                 Content::Solid | Content::Unknown => [0.0; 9],
             };
@@ -101,17 +102,6 @@ impl Weight {
     pub fn slope(&self, cell: usize) -> [f64; 2] {
         let points = || self.at_gauss[cell].iter().zip(GAUSS_3X3.iter());
         [0, 1].map(|c| points().map(|(d, g)| 3.0 * d * g.weight * g.r[c]).sum())
-    }
-
-    /// `integral density N` over the cell's area.
-    pub fn nodal_masses(&self, cell: usize) -> [f64; 9] {
-        let mut mass = [0.0; 9];
-        for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
-            for (mass, n) in mass.iter_mut().zip(&g.shape.n) {
-                *mass += g.weight * density * n;
-            }
-        }
-        mass
     }
 
     /// Mass at each Gauss point as a share of the cell's area, reference coordinates, shape

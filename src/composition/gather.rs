@@ -1,0 +1,212 @@
+//! What the particles of one cell show: volumes, shares at the Gauss points, orientations, fits of
+//! carried viscosities, and how two materials lie to each other.
+//!
+//! The share of material `m` at Gauss point `g` is the particle volume near it, weighted by
+//! `exp(-r^2 / (0.4 h)^2)`.
+
+use super::Kind;
+use super::features::{self, Strip};
+use super::interface::{Interface, Surroundings};
+use crate::laws::director::Orientation;
+use crate::space::fit::{Degree, Fit, Polynomial};
+use crate::space::mesh::Mesh;
+use crate::space::particles::Particles;
+use crate::space::shape::{GAUSS_3, GAUSS_3X3};
+use std::cell::RefCell;
+
+/// Width of the kernel in cells: 0.4 was the best of those measured.
+const KERNEL_WIDTH: f64 = 0.4;
+
+/// Matching of shares to volumes stops here: far below the noise of the particles.
+const MATCHING_TOLERANCE: f64 = 1e-6;
+const MATCHING_ITERATIONS: usize = 30;
+
+/// Sums over the particles of one cell, by Gauss point and material.
+#[derive(Default)]
+pub struct Gathered {
+    /// Kernel-weighted volume, then share; index `9 m + g`.
+    weight: Vec<f64>,
+    orientation: Vec<Orientation>,
+    /// Per material.
+    volume: Vec<f64>,
+    log_viscosity: Vec<Fit>,
+    /// Fits of `ln eta`, by material.
+    viscosity: Vec<Option<Polynomial>>,
+    /// Of all of the cell's particles, by material.
+    cell_orientation: Vec<Orientation>,
+    surroundings: Surroundings,
+    numbers: Vec<f64>,
+}
+
+thread_local! {
+    /// Each thread's own room.
+    pub static SCRATCH: RefCell<Gathered> = RefCell::default();
+}
+
+/// Two materials of a cell and the particles around it.
+pub struct Neighbourhood<'a> {
+    /// Indices of the two materials.
+    pub between: [usize; 2],
+    /// Share of the second one.
+    pub share: f64,
+    size: [f64; 2],
+    surroundings: &'a Surroundings,
+    numbers: &'a mut Vec<f64>,
+}
+
+impl Neighbourhood<'_> {
+    /// Whether the first or the second material forms a drop in the other.
+    pub fn is_drop(&self, second: bool) -> bool {
+        features::is_drop(self.surroundings.particles(), second)
+    }
+
+    /// The rims of a sheet that the first or the second material forms, if they can be trusted.
+    pub fn sheet(&mut self, second: bool) -> Option<Interface> {
+        let strip: Strip = features::sheet(self.surroundings.particles(), second, self.numbers)?;
+        let interface = Interface::of_sheet(&strip, second, self.size, self.share);
+        (interface.trust > 0.0).then_some(interface)
+    }
+
+    /// The interface, if there is one that can be trusted.
+    pub fn interface(&self) -> Option<Interface> {
+        self.surroundings.interface(self.share).filter(|i| i.trust > 0.0)
+    }
+}
+
+impl Gathered {
+    /// Makes room for a number of materials.
+    pub fn prepare(&mut self, materials: usize) {
+        self.weight.resize(9 * materials, 0.0);
+        self.orientation.resize(9 * materials, Orientation::default());
+        self.volume.resize(materials, 0.0);
+        self.log_viscosity.resize(materials, Fit::default());
+        self.cell_orientation.resize(materials, Orientation::default());
+    }
+
+    /// Takes up the particles of a cell.
+    pub fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, kinds: &[Kind]) {
+        self.weight.fill(0.0);
+        self.orientation.fill(Orientation::default());
+        self.volume.fill(0.0);
+        self.log_viscosity.iter_mut().for_each(Fit::clear);
+        self.cell_orientation.fill(Orientation::default());
+        for p in particles.of_cell(cell) {
+            let m = particles.material[p] as usize;
+            let volume = particles.volume[p];
+            let director = particles.director.as_ref().filter(|_| kinds[m].directors).map(|d| d[p]);
+            let r = mesh.to_reference(cell, particles.position[p]);
+            let kernel = |t: f64, g: f64| {
+                let q = 0.5 * (t - g) / KERNEL_WIDTH;
+                (-q * q).exp()
+            };
+            let kx = GAUSS_3.map(|g| kernel(r[0], g));
+            let ky = GAUSS_3.map(|g| kernel(r[1], g));
+            self.volume[m] += volume;
+            if let Some(n) = director {
+                self.cell_orientation[m].add(volume, n);
+            }
+            for g in 0..9 {
+                let w = volume * kx[g % 3] * ky[g / 3];
+                self.weight[9 * m + g] += w;
+                if let Some(n) = director {
+                    self.orientation[9 * m + g].add(w, n);
+                }
+            }
+            if let (Some(v), true) = (&particles.viscosity, kinds[m].viscosity) {
+                self.log_viscosity[m].add(volume, r, v[p].ln());
+            }
+        }
+    }
+
+    /// The two materials of the cell and the particles around it; `None` if there are more or fewer.
+    pub fn neighbourhood(
+        &mut self,
+        mesh: &Mesh,
+        cell: usize,
+        particles: &Particles,
+    ) -> Option<Neighbourhood<'_>> {
+        let mut present = (0..self.volume.len()).filter(|&m| self.volume[m] > 0.0);
+        let (Some(first), Some(second), None) = (present.next(), present.next(), present.next())
+        else {
+            return None;
+        };
+        let between = [first, second];
+        let [a, b] = between.map(|m| self.volume[m]);
+        self.surroundings.gather(mesh, particles, cell, between);
+        Some(Neighbourhood {
+            between,
+            share: b / (a + b),
+            size: mesh.cell_size(cell),
+            surroundings: &self.surroundings,
+            numbers: &mut self.numbers,
+        })
+    }
+
+    /// Turns kernel weights into shares whose mean over the cell is each material's share of
+    /// the particles' volume: weights of a material are scaled by a common factor, found by
+    /// fixed-point iteration. So a cell weighs what its particles weigh.
+    pub fn match_volumes(&mut self, factors: &[f64]) {
+        let materials = factors.len();
+        let wanted = |volume: &[f64], m: usize| volume[m] * factors[m];
+        let volume: f64 = (0..materials).map(|m| wanted(&self.volume, m)).sum();
+        let normalise = |weight: &mut [f64]| {
+            for g in 0..9 {
+                let total: f64 = (0..materials).map(|m| weight[9 * m + g]).sum();
+                (0..materials).for_each(|m| weight[9 * m + g] /= total);
+            }
+        };
+        normalise(&mut self.weight);
+        if self.volume.iter().filter(|&&v| v > 0.0).count() < 2 {
+            return;
+        }
+        for _ in 0..MATCHING_ITERATIONS {
+            let mut worst: f64 = 0.0;
+            for m in 0..materials {
+                let share = wanted(&self.volume, m) / volume;
+                let weight = &mut self.weight[9 * m..9 * m + 9];
+                let mean: f64 =
+                    weight.iter().zip(GAUSS_3X3.iter()).map(|(w, g)| w * g.weight).sum();
+                if share > 0.0 && mean > 0.0 {
+                    weight.iter_mut().for_each(|w| *w *= share / mean);
+                    worst = worst.max((share - mean).abs());
+                }
+            }
+            normalise(&mut self.weight);
+            if worst < MATCHING_TOLERANCE {
+                break;
+            }
+        }
+    }
+
+    /// Fits the carried viscosities; [`Gathered::viscosity_at`] then reads them.
+    pub fn fit_viscosities(&mut self) {
+        self.viscosity.clear();
+        self.viscosity.extend(self.log_viscosity.iter().map(|f| f.solve(Degree::Quadratic)));
+    }
+
+    /// Share of a material at a Gauss point, after [`Gathered::match_volumes`].
+    pub fn share(&self, material: usize, g: usize) -> f64 {
+        self.weight[9 * material + g]
+    }
+
+    /// Volumes of the materials.
+    pub fn volumes(&self) -> &[f64] {
+        &self.volume
+    }
+
+    /// Orientation of a material's directors near a Gauss point.
+    pub fn orientation(&self, material: usize, g: usize) -> &Orientation {
+        &self.orientation[9 * material + g]
+    }
+
+    /// Orientation of a material's directors in the whole cell.
+    pub fn cell_orientation(&self, material: usize) -> &Orientation {
+        &self.cell_orientation[material]
+    }
+
+    /// Carried viscosity of a material at reference coordinates `r`, after
+    /// [`Gathered::fit_viscosities`]; `None` where its particles carry none.
+    pub fn viscosity_at(&self, material: usize, r: [f64; 2]) -> Option<f64> {
+        self.viscosity[material].as_ref().map(|fit| fit.at_bounded(r).exp())
+    }
+}

@@ -1,0 +1,74 @@
+//! This module computes the mean law of the materials that share a cell, at an integration point.
+
+use super::point::{PointLaw, Sym2};
+
+/// The matrix `S + f I`.
+fn shifted(s: &Sym2, f: f64) -> Sym2 {
+    Sym2 { a: s.a + f, b: s.b + f, c: s.c }
+}
+
+/// Mean law of the materials that share a cell, at an integration point.
+///
+/// - Deviatoric viscosity: harmonic mean, `S^-1 = sum phi_m S_m^-1`, so the weaker material
+///   determines the shear of a cell cut by an interface. Dilation term: harmonic mean, like the
+///   deviatoric viscosity.
+/// - Coupling viscosity: arithmetic mean, each material weighted by its share of the shear,
+///   `eta_c = sum phi_m eta_c,m eta / eta_m`: where the weak material takes the strain, the stiff
+///   material has little spin to couple to.
+/// - Couple viscosity: arithmetic mean, `M = sum phi_m M_m`, so that the natural (moment-free)
+///   boundary condition at the edge of a Cosserat material is that of its own share of the cell.
+///
+/// With an unweighted mean of `eta_c`, a drop of Cosserat fluid in a fluid a thousand times thinner
+/// fell 10 % too slowly at 16 cells; with this mean the error is 2 %. A harmonic mean is better in
+/// that case but worse between fluids of equal viscosity. The physics test
+/// `cut_cosserat_drops_converge` measures this error.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mixture {
+    /// Viscosity of the material that surrounds the others; zero if there is none.
+    around: f64,
+    fluidity: Sym2,
+    inverse_dilation: f64,
+    dilation_share: f64,
+    /// The sum of `phi_m eta_c,m / eta_m`.
+    coupling_share: f64,
+    couple: f64,
+}
+
+impl Mixture {
+    /// An empty mixture in which a material of the given viscosity `M` surrounds drops of the
+    /// others: `(S + M)^-1 = sum phi_m (S_m + M)^-1`. This is the bound of Hashin and Shtrikman;
+    /// its dilute limit in two dimensions is `M [1 + 2 phi (lambda - 1)/(lambda + 1)]`. `M = 0`
+    /// gives the harmonic mean. At a contrast of 1000, drops of radius 0.35 h dissipate 1.07
+    /// (stiff) and 0.96 (weak) times the true excess, against 0.65 and 7.3 times.
+    pub fn around_drops(viscosity: f64) -> Self {
+        Mixture { around: viscosity, ..Mixture::default() }
+    }
+
+    /// Adds a material with the volume fraction `phi`.
+    pub fn add(&mut self, phi: f64, law: &PointLaw) {
+        let shear = shifted(&law.shear, self.around);
+        self.fluidity.add_scaled(phi, &shear.inverse());
+        if law.dilation > 0.0 {
+            self.inverse_dilation += phi / (law.dilation + self.around);
+            self.dilation_share += phi;
+        }
+        self.coupling_share += phi * law.coupling / law.shear.mean();
+        self.couple += phi * law.couple;
+    }
+
+    /// The law of the mixture; the volume fractions must add up to one.
+    pub fn law(&self) -> PointLaw {
+        let shear = shifted(&self.fluidity.inverse(), -self.around);
+        PointLaw {
+            shear,
+            dilation: if self.dilation_share > 0.0 {
+                let harmonic = self.dilation_share / self.inverse_dilation;
+                self.dilation_share * (harmonic - self.around)
+            } else {
+                0.0
+            },
+            coupling: self.coupling_share * shear.mean(),
+            couple: self.couple,
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! This module resolves `[accuracy]`.
+
+use super::values::Result;
+use crate::plan::Method;
+use crate::scene::{Scene, SceneError};
+use crate::space::seeding::Seeding;
+
+/// Settings of the numerical method.
+pub(super) fn method(scene: &Scene) -> Result<Method> {
+    let a = &scene.accuracy;
+    let side = f64::from(a.particles_per_cell).sqrt().round() as usize;
+    if side == 0 || side * side != a.particles_per_cell as usize || side > 32 {
+        return Err(SceneError::new(
+            format!("accuracy.particles_per_cell is {}", a.particles_per_cell),
+            "give a square number from 1 to 1024: 9, 16, 25, ...",
+        ));
+    }
+    if !(a.tolerance >= 1e-14 && a.tolerance <= 1e-2) {
+        return Err(SceneError::new(
+            format!("accuracy.tolerance is {}", a.tolerance),
+            "give 1e-14 to 1e-2; 1e-12 is the limit of double precision in stiff scenes",
+        ));
+    }
+    if !(0.0..=2.0).contains(&a.stabilisation) {
+        return Err(SceneError::new(
+            format!("accuracy.stabilisation is {}", a.stabilisation),
+            "give a fraction of a step, 0.6 to 1, or 0 to switch it off; 0.75 is usual",
+        ));
+    }
+    if a.max_corrections == 0 {
+        return Err(SceneError::new(
+            "accuracy.max_corrections is 0",
+            "give 1 or more; 40 is usual",
+        ));
+    }
+    Ok(Method {
+        seeding: Seeding { side, placement: a.placement, seed: a.seed },
+        quadrature: a.quadrature,
+        integrator: a.integrator,
+        stabilisation: None,
+        tolerance: a.tolerance,
+        max_corrections: a.max_corrections,
+    })
+}

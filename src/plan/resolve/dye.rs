@@ -1,0 +1,72 @@
+//! This module resolves `[dye]`, the passive lines and the marked particles.
+
+use super::values::{Result, pair, positive};
+use crate::plan::{Mark, Tracers, Units};
+use crate::scene::{Scene, SceneError, Scope};
+
+/// The passive lines, and the segments whose particles are marked.
+pub(super) fn dye(
+    scene: &Scene,
+    scope: &Scope,
+    length: f64,
+    units: &Units,
+) -> Result<(Option<Tracers>, Vec<Mark>)> {
+    let Some(dye) = &scene.dye else { return Ok((None, vec![])) };
+    let l = units.length;
+    let spacing = length / f64::from(scene.accuracy.cells) / l * 0.5;
+    let mut lines = Vec::new();
+    let mut add = |points: &[[f64; 2]]| {
+        let mut line: Vec<[f64; 2]> = vec![points[0].map(|v| v / l)];
+        for pair in points.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|p| p.map(|v| v / l));
+            let n = ((b[0] - a[0]).hypot(b[1] - a[1]) / spacing).ceil().clamp(1.0, 1e5) as usize;
+            line.extend((1..=n).map(|k| {
+                let t = k as f64 / n as f64;
+                [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]
+            }));
+        }
+        lines.push(line);
+    };
+    if let Some(g) = &dye.grid {
+        let (x, y) = (pair(&g.x, scope)?, pair(&g.y, scope)?);
+        let step = positive(&g.spacing, scope, "dye.grid.spacing")?;
+        let counts = [x, y].map(|[a, b]| ((b - a) / step + 1e-9).floor());
+        if counts.iter().any(|&n| n > 1000.0) {
+            return Err(SceneError::at(
+                &g.spacing,
+                format!("the dye grid would have {} lines", counts[0] + counts[1]),
+                "widen the spacing: at most 1000 lines each way",
+            ));
+        }
+        for i in 0..=counts[0].max(-1.0) as i64 {
+            let at = x[0] + step * i as f64;
+            add(&[[at, y[0]], [at, y[1]]]);
+        }
+        for j in 0..=counts[1].max(-1.0) as i64 {
+            let at = y[0] + step * j as f64;
+            add(&[[x[0], at], [x[1], at]]);
+        }
+    }
+    for line in &dye.lines {
+        let points = line.iter().map(|p| pair(p, scope)).collect::<Result<Vec<_>>>()?;
+        if points.len() < 2 {
+            return Err(SceneError::new(
+                "a dye line has fewer than two points",
+                "give two or more",
+            ));
+        }
+        add(&points);
+    }
+    let marks = dye
+        .marks
+        .iter()
+        .map(|m| {
+            Ok(Mark {
+                from: pair(&m.from, scope)?.map(|v| v / l),
+                to: pair(&m.to, scope)?.map(|v| v / l),
+                half_width: 0.5 * positive(&m.width, scope, "the width of a mark")? / l,
+            })
+        })
+        .collect::<Result<Vec<_>>>()?;
+    Ok(((!lines.is_empty()).then_some(Tracers { lines, spacing }), marks))
+}

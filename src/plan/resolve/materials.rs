@@ -1,0 +1,267 @@
+//! This module resolves the `[materials]` tables and gravity into checked values in SI units.
+
+use super::values::{Result, finite_range, not_negative, pair, positive};
+use crate::laws::cosserat::{self, Cosserat};
+use crate::laws::{Law, Shear, granular};
+use crate::plan::material::Material;
+use crate::plan::{MAX_MATERIALS, Matter, Units, Warning};
+use crate::scene::{self, FieldFn, Scene, SceneError, Scope, closest};
+use indexmap::IndexMap;
+
+/// Smallest ratio of viscosities that causes a warning about drops in a thin fluid. At a ratio of
+/// 1e5 the steps of the silo were a tenth of the usual.
+const THIN: f64 = 1e5;
+
+/// Warns of a dense material together with a lighter one that is far less viscous; of several
+/// pairs, the one with the largest ratio of viscosities.
+pub(super) fn thin_fluid(materials: &[SiMaterial]) -> Option<Warning> {
+    let pairs = materials.iter().flat_map(|a| materials.iter().map(move |b| (a, b)));
+    let ratio = |a: &SiMaterial, b: &SiMaterial| a.viscosity / b.viscosity;
+    pairs
+        .filter(|(a, b)| a.density > b.density && ratio(a, b) >= THIN)
+        .max_by(|(a, b), (c, d)| ratio(a, b).total_cmp(&ratio(c, d)))
+        .map(|(a, b)| Warning::ThinFluid {
+            dense: a.name.clone(),
+            thin: b.name.clone(),
+            ratio: ratio(a, b),
+        })
+}
+
+/// Materials and gravity in SI units, checked.
+pub(super) struct SiMatter {
+    pub(super) materials: Vec<SiMaterial>,
+    pub(super) gravity: [f64; 2],
+    pub(super) warnings: Vec<Warning>,
+}
+
+pub(super) struct SiMaterial {
+    pub(super) name: String,
+    pub(super) viscosity: f64,
+    pub(super) viscosity_field: Option<FieldFn>,
+    pub(super) density: f64,
+    pub(super) density_field: Option<FieldFn>,
+    pub(super) compliance: f64,
+    pub(super) rotation: Option<Cosserat>,
+    pub(super) layer_viscosity: Option<f64>,
+    pub(super) background: bool,
+}
+
+impl SiMatter {
+    pub(super) fn new(scene: &Scene, scope: &Scope) -> Result<SiMatter> {
+        let gravity = [scene.gravity[0].eval(scope)?, scene.gravity[1].eval(scope)?];
+        let (x, y) = (pair(&scene.domain.x, scope)?, pair(&scene.domain.y, scope)?);
+        if scene.materials.is_empty() || scene.materials.len() > MAX_MATERIALS {
+            return Err(SceneError::new(
+                format!("the scene has {} materials", scene.materials.len()),
+                format!("give 1 to {MAX_MATERIALS} [materials.<name>] tables"),
+            ));
+        }
+        let mut warnings = Vec::new();
+        let mut materials = Vec::new();
+        let mut errors = Vec::new();
+        for (name, m) in &scene.materials {
+            match SiMaterial::new(name, m, scope, [x, y], &mut warnings) {
+                Ok(m) => materials.push(m),
+                Err(e) => errors.push(e),
+            }
+        }
+        SceneError::join(errors)?;
+        let backgrounds: Vec<_> =
+            materials.iter().filter(|m| m.background).map(|m| m.name.as_str()).collect();
+        if backgrounds.len() > 1 {
+            return Err(SceneError::new(
+                format!("more than one background material: {}", backgrounds.join(", ")),
+                "set `background = true` on one of them only",
+            ));
+        }
+        Ok(SiMatter { materials, gravity, warnings })
+    }
+
+    pub(super) fn matter(&self, u: &Units) -> Matter {
+        let materials = self
+            .materials
+            .iter()
+            .map(|m| Material {
+                name: m.name.clone(),
+                viscosity: m.viscosity / u.viscosity,
+                carries_viscosity: m.viscosity_field.is_some(),
+                density: m.density / u.density,
+                carries_density: m.density_field.is_some(),
+                law: Law {
+                    shear: m.layer_viscosity.map_or(Shear::Newtonian, |v| Shear::Layered {
+                        layer_viscosity: v / u.viscosity,
+                    }),
+                    rotation: m.rotation.map(|r| Cosserat {
+                        coupling: r.coupling / u.viscosity,
+                        couple: r.couple / u.couple_viscosity(),
+                    }),
+                    compliance: m.compliance * u.viscosity,
+                },
+                background: m.background,
+            })
+            .collect();
+        let gravity = self.gravity.map(|g| g / u.acceleration());
+        Matter { materials, gravity, relaxation: None }
+    }
+}
+
+impl SiMaterial {
+    fn new(
+        name: &str,
+        m: &scene::Material,
+        scope: &Scope,
+        domain: [[f64; 2]; 2],
+        warnings: &mut Vec<Warning>,
+    ) -> Result<SiMaterial> {
+        let density = m.density.compile(scope)?;
+        let density_range = finite_range(&m.density, &density, domain, "density")?;
+        if density.constant().is_some_and(|d| d < 0.0) {
+            return Err(SceneError::at(
+                &m.density,
+                format!("material `{name}`: density is {}", density_range[0]),
+                "density must be zero or more",
+            ));
+        }
+        let contacts = m
+            .granular
+            .as_ref()
+            .map(|g| -> Result<_> {
+                let porosity = g.porosity.eval(scope)?;
+                if !(0.0..1.0).contains(&porosity) {
+                    return Err(SceneError::at(
+                        &g.porosity,
+                        format!("porosity is {porosity}"),
+                        "porosity is the void share: 0 or more, below 1",
+                    ));
+                }
+                Ok(granular::viscosities(&granular::Contacts {
+                    porosity,
+                    coordination: positive(&g.coordination, scope, "coordination")?,
+                    normal_dashpot: positive(&g.normal_dashpot, scope, "normal_dashpot")?,
+                    tangential_dashpot: not_negative(
+                        &g.tangential_dashpot,
+                        scope,
+                        "tangential_dashpot",
+                    )?,
+                }))
+            })
+            .transpose()?;
+        let (shear, range) = match (&m.shear_viscosity, contacts) {
+            (Some(q), None) => {
+                let f = q.compile(scope)?;
+                let range = finite_range(q, &f, domain, "shear_viscosity")?;
+                if range[0] <= 0.0 {
+                    return Err(SceneError::at(
+                        q,
+                        format!("material `{name}`: shear_viscosity is {}", range[0]),
+                        "shear_viscosity must be above zero everywhere",
+                    ));
+                }
+                (f, range)
+            }
+            (None, Some(c)) => (FieldFn::Constant(c.shear), [c.shear; 2]),
+            (Some(q), Some(_)) => {
+                return Err(SceneError::at(
+                    q,
+                    format!("material `{name}` has both shear_viscosity and granular"),
+                    "give one of them",
+                ));
+            }
+            (None, None) => {
+                return Err(SceneError::new(
+                    format!("material `{name}` has no viscosity"),
+                    "give shear_viscosity = <Pa s>, or a granular table",
+                ));
+            }
+        };
+        let coupling = match (&m.coupling_viscosity, contacts) {
+            (Some(q), _) => not_negative(q, scope, "coupling_viscosity")?,
+            (None, Some(c)) => c.coupling,
+            (None, None) => 0.0,
+        };
+        let couple = match (&m.internal_length, &m.couple_viscosity) {
+            (Some(r), None) => {
+                cosserat::couple_viscosity(coupling, not_negative(r, scope, "internal_length")?)
+            }
+            (None, Some(q)) => not_negative(q, scope, "couple_viscosity")?,
+            (None, None) => 0.0,
+            (Some(q), Some(_)) => {
+                return Err(SceneError::at(
+                    q,
+                    format!("material `{name}` has both internal_length and couple_viscosity"),
+                    "give one of them: couple_viscosity = 2 coupling_viscosity internal_length^2",
+                ));
+            }
+        };
+        let rotation = (coupling > 0.0 && couple > 0.0).then_some(Cosserat { coupling, couple });
+        let length_alone =
+            coupling == 0.0 && m.internal_length.is_some() && m.coupling_viscosity.is_none();
+        if length_alone || coupling > 0.0 && couple == 0.0 && m.internal_length.is_none() {
+            warnings.push(Warning::NoInternalLength { material: name.into() });
+        }
+        let bulk = match (&m.bulk_viscosity, contacts, &m.granular) {
+            (Some(q), ..) => Some(positive(q, scope, "bulk_viscosity")?),
+            (None, Some(c), Some(g)) if !g.incompressible => Some(c.bulk),
+            _ => None,
+        };
+        let layer = m
+            .layer_viscosity
+            .as_ref()
+            .map(|q| positive(q, scope, "layer_viscosity"))
+            .transpose()?
+            .filter(|&eta_s| shear.constant() != Some(eta_s));
+        if let Some(eta_s) = layer
+            && eta_s > range[0]
+        {
+            warnings.push(Warning::StiffLayers { material: name.into(), ratio: eta_s / range[0] });
+        }
+        let varying = |f: FieldFn| f.constant().is_none().then_some(f);
+        // A particle whose volume changes keeps its mass, so it carries its own density.
+        let density_field = if bulk.is_some() && density_range != [0.0; 2] {
+            Some(density)
+        } else {
+            varying(density)
+        };
+        let out = SiMaterial {
+            name: name.into(),
+            viscosity: range[1],
+            density: density_range[1].max(0.0),
+            viscosity_field: varying(shear),
+            density_field,
+            compliance: bulk.map_or(0.0, |b| 1.0 / b),
+            rotation,
+            layer_viscosity: layer,
+            background: m.background,
+        };
+        if out.background
+            && (out.viscosity_field.is_some()
+                || out.density_field.is_some()
+                || out.layer_viscosity.is_some()
+                || out.rotation.is_some()
+                || out.compliance > 0.0)
+        {
+            return Err(SceneError::new(
+                format!("the background `{name}` carries a history"),
+                "a background has no history: constant density and viscosity, incompressible, no \
+                 layers, no internal length; else set background = false",
+            ));
+        }
+        Ok(out)
+    }
+}
+
+pub(super) fn material_index<'a>(
+    materials: &'a IndexMap<String, scene::Material>,
+    name: &str,
+    user: &str,
+) -> Result<u8> {
+    materials.get_index_of(name).map(|i| i as u8).ok_or_else(|| {
+        let known: Vec<&'a str> = materials.keys().map(String::as_str).collect();
+        let guess = closest(name, known.iter().copied())
+            .map_or(String::new(), |g| format!("did you mean `{g}`? "));
+        SceneError::new(
+            format!("{user} names the material `{name}`, which does not exist"),
+            format!("{guess}materials: {}", known.join(", ")),
+        )
+    })
+}

@@ -1,0 +1,173 @@
+//! This module resolves a scene into a plan. It applies all defaults and checks, with one file per
+//! table of the scene.
+
+mod accuracy;
+mod boundaries;
+mod dye;
+mod gauges;
+mod materials;
+mod mesh;
+mod recording;
+mod regions;
+mod scales;
+mod schedule;
+mod time;
+mod values;
+mod walls;
+
+pub use schedule::resolve;
+
+use super::boundary::{SIDES, side_normal};
+use super::{EffectSet, InitialFields, Method, Plan, Warning};
+use crate::scene::{Field, FieldFn, Scene, SceneError, Scope};
+use materials::{SiMatter, thin_fluid};
+use regions::{placed, regions};
+use std::sync::Arc;
+use values::{Result, finite_range, middle, pair, positive};
+use walls::Walls;
+
+/// Resolves a scene as if its schedule were empty.
+fn without_schedule(scene: &Scene) -> Result<Plan> {
+    let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if scene.name.is_empty() || scene.name.len() > 100 || !scene.name.chars().all(ordinary) {
+        return Err(SceneError::new(
+            format!("the scene's name is {:?}", scene.name),
+            "it names folders: use 1 to 100 letters, digits, `_` and `-`",
+        ));
+    }
+    let scope = &Scope::new(scene)?;
+    let (x, y) = (pair(&scene.domain.x, scope)?, pair(&scene.domain.y, scope)?);
+    for (name, range, q) in [("x", x, &scene.domain.x), ("y", y, &scene.domain.y)] {
+        if range[1] <= range[0] {
+            return Err(SceneError::at(
+                &q[1],
+                format!("domain.{name} is empty: [{}, {}]", range[0], range[1]),
+                "the second number must be above the first",
+            ));
+        }
+    }
+    let domain = [x, y];
+    let length = match &scene.domain.length_scale {
+        Some(q) => positive(q, scope, "length_scale")?,
+        None => (x[1] - x[0]).min(y[1] - y[0]),
+    };
+    // All materials and regions are checked, including those that fill no part of the domain.
+    let mut warnings = Vec::new();
+    regions(scene, scope, domain, &SiMatter::new(scene, scope)?, &mut warnings)?;
+    let (whole, scene) = (scene, &placed(scene));
+    for name in whole.materials.keys().filter(|name| !scene.materials.contains_key(*name)) {
+        if !whole.materials[name].background {
+            warnings.push(Warning::MaterialUnused { material: name.clone() });
+        }
+    }
+    let si = SiMatter::new(scene, scope)?;
+    let units = scales::choose_units(scene, scope, &si, domain, length)?;
+    let mut state = si.matter(&units);
+    warnings.extend(si.warnings.iter().cloned());
+
+    let walls = Walls::new(scene, scope, domain)?;
+    let gauges = gauges::gauges(scene, scope, domain)?;
+    gauges::interest(scene)?;
+    let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &walls, &gauges, &units)?);
+    state.relaxation = schedule::relaxation(&state, &mesh);
+    let sides = boundaries::sides(scene, scope, domain)?;
+    let boundary = boundaries::boundary(sides, &walls, &mesh, &units, &state)?;
+    let mut enclosure = walls.enclosure(scene, &mesh, &units);
+    for (s, side) in boundary.sides.iter().enumerate() {
+        let through =
+            side.velocity[side_normal(s)].as_ref().is_some_and(|f| f.constant() != Some(0.0));
+        // Particles leave with the outflow.
+        enclosure.open[s] |= through;
+        if through {
+            warnings.push(Warning::ThroughFlow { place: format!("boundaries.{}", SIDES[s]) });
+        }
+    }
+
+    let regions = regions(scene, scope, domain, &si, &mut Vec::new())?;
+    let has_density = si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some());
+    let effects = EffectSet {
+        rotation: si.materials.iter().any(|m| m.rotation.is_some()),
+        directors: si.materials.iter().any(|m| m.layer_viscosity.is_some()),
+        carried_viscosity: si.materials.iter().any(|m| m.viscosity_field.is_some()),
+        carried_density: si.materials.iter().any(|m| m.density_field.is_some()),
+        volume_change: si.materials.iter().any(|m| m.compliance > 0.0),
+        gravity: si.gravity != [0.0; 2] && has_density,
+    };
+    if !effects.rotation {
+        for (name, side) in SIDES.iter().zip(&boundary.sides) {
+            if side.rotation.is_some() {
+                warnings.push(Warning::RotationUnused { place: format!("boundaries.{name}") });
+            }
+        }
+    }
+    let density = si.materials.iter().map(|m| m.density).fold(0.0, f64::max);
+    let viscosity = si.materials.iter().map(|m| m.viscosity).fold(0.0, f64::max);
+    let reynolds = density / units.time * length * length / viscosity;
+    if reynolds > 1.0 {
+        warnings.push(Warning::Inertia { reynolds });
+    }
+    if effects.gravity {
+        warnings.extend(thin_fluid(&si.materials));
+    }
+    let body_force = scene
+        .body_force
+        .as_ref()
+        .map(|f| {
+            Ok::<_, SceneError>([
+                f.x.compile(scope)?,
+                f.y.compile(scope)?,
+                f.couple.compile(scope)?,
+            ])
+        })
+        .transpose()?;
+    let acceleration = scene
+        .acceleration
+        .as_ref()
+        .map(|a| {
+            let compile = |f: &Field| -> Result<FieldFn> {
+                let compiled = f.compile(scope)?;
+                finite_range(f, &compiled, middle(domain), "acceleration")?;
+                Ok(compiled)
+            };
+            Ok::<_, SceneError>([compile(&a.x)?, compile(&a.y)?])
+        })
+        .transpose()?
+        .filter(|_| has_density);
+    boundaries::check_null_spaces(scene, &boundary, &mesh, &units, &effects, body_force.as_ref())?;
+
+    let initial = si
+        .materials
+        .iter()
+        .map(|m| InitialFields {
+            viscosity: m.viscosity_field.clone(),
+            density: m.density_field.clone(),
+        })
+        .collect();
+    let gauges = gauges.into_iter().map(|g| g.scaled(&mesh, &units)).collect();
+    let (tracers, marks) = dye::dye(scene, scope, length, &units)?;
+    Ok(Plan {
+        scene: whole.clone(),
+        units,
+        enclosure,
+        boundary,
+        state,
+        changes: vec![],
+        regions,
+        initial,
+        body_force,
+        acceleration,
+        gauges,
+        tracers,
+        marks,
+        method: Method {
+            stabilisation: Some(scene.accuracy.stabilisation)
+                .filter(|&share| share > 0.0 && effects.gravity),
+            ..accuracy::method(scene)?
+        },
+        clock: time::clock(scene, scope, &units)?,
+        picture: recording::picture(scene)?,
+        effects,
+        warnings,
+        mesh,
+    })
+}

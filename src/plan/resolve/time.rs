@@ -1,0 +1,54 @@
+//! This module resolves `[time]` and the times of frames.
+
+use super::values::{Result, positive};
+use crate::plan::{ClockPlan, Units};
+use crate::scene::{Scene, SceneError, Scope};
+
+/// End time, limits of the time step, and times of frames.
+pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<ClockPlan> {
+    let t = &scene.time;
+    let end = positive(&t.end, scope, "time.end")?;
+    let max_step = t.max_step.as_ref().map(|q| positive(q, scope, "time.max_step")).transpose()?;
+    if !(t.courant > 0.0 && t.courant <= 50.0) {
+        return Err(SceneError::new(
+            format!("time.courant is {}", t.courant),
+            "cells crossed per step: above 0, at most 50; 0.5 is usual",
+        ));
+    }
+    if !(t.strain > 0.0 && t.strain <= 10.0) {
+        return Err(SceneError::new(
+            format!("time.strain is {}", t.strain),
+            "strain per step: above 0, at most 10; 0.25 is usual",
+        ));
+    }
+    let r = &scene.recording;
+    let mut frames: Vec<f64> =
+        (0..=r.frames).map(|k| end * f64::from(k) / f64::from(r.frames.max(1))).collect();
+    for q in &r.times {
+        let v = q.eval(scope)?;
+        if !(0.0..=end * (1.0 + 1e-12)).contains(&v) {
+            return Err(SceneError::at(
+                q,
+                format!("recording time {v} is outside the run"),
+                format!("choose 0 to {end} s"),
+            ));
+        }
+        frames.push(v.min(end));
+    }
+    frames.sort_by(f64::total_cmp);
+    // Times whose difference is invisible are one frame.
+    let least = end * 1e-6;
+    frames.dedup_by(|b, a| *b - *a < least);
+    let frames: Vec<f64> = frames.into_iter().map(|v| v / units.time).collect();
+    let end = end / units.time;
+    let mut stops: Vec<f64> = frames.iter().copied().filter(|&v| v > 0.0 && v < end).collect();
+    stops.push(end);
+    Ok(ClockPlan {
+        end,
+        max_step: max_step.map(|v| v / units.time),
+        courant: t.courant,
+        strain: t.strain,
+        stops,
+        frames,
+    })
+}

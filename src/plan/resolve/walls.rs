@@ -1,0 +1,171 @@
+//! This module resolves `[[walls]]` and `[[blocks]]` into obstacles along mesh lines, and finds the
+//! edges (lips) of apertures.
+
+use super::values::{Result, pair};
+use crate::plan::Units;
+use crate::scene::{BoundaryKind, Quantity, Scene, SceneError, Scope, WallKind};
+use crate::space::mesh::Mesh;
+use crate::space::segment::Segment;
+use crate::space::walls::Enclosure;
+
+/// Walls and blocks in SI coordinates.
+pub(super) struct Walls {
+    pub(super) walls: Vec<SiWall>,
+    /// Ranges along x and y (m) and kind of each block.
+    pub(super) blocks: Vec<([[f64; 2]; 2], WallKind)>,
+}
+
+/// A wall in SI coordinates.
+pub(super) struct SiWall {
+    pub(super) name: String,
+    pub(super) segment: Segment,
+    pub(super) kind: WallKind,
+    /// Prescribed rotation rate, 1/s.
+    pub(super) rotation: Option<f64>,
+}
+
+/// The segment between two points, or an error if it is not along a coordinate direction, has no
+/// length or leaves the domain.
+pub(super) fn axis_segment(
+    what: &str,
+    from: &[Quantity; 2],
+    to: &[Quantity; 2],
+    scope: &Scope,
+    [x, y]: [[f64; 2]; 2],
+) -> Result<Segment> {
+    let (a, b) = (pair(from, scope)?, pair(to, scope)?);
+    let size = (x[1] - x[0]).max(y[1] - y[0]);
+    let tiny = 1e-9 * size;
+    for (p, q) in [(a, from), (b, to)] {
+        if p[0] < x[0] - tiny || p[0] > x[1] + tiny || p[1] < y[0] - tiny || p[1] > y[1] + tiny {
+            return Err(SceneError::at(
+                &q[0],
+                format!("{what} reaches ({}, {}), outside the domain", p[0], p[1]),
+                format!("the domain is x = {} to {}, y = {} to {}", x[0], x[1], y[0], y[1]),
+            ));
+        }
+    }
+    let (dx, dy) = ((a[0] - b[0]).abs(), (a[1] - b[1]).abs());
+    if dx > tiny && dy > tiny {
+        return Err(SceneError::at(
+            &to[0],
+            format!("{what} is slanted: from ({}, {}) to ({}, {})", a[0], a[1], b[0], b[1]),
+            "walls and gauges follow mesh lines: make both x or both y equal",
+        ));
+    }
+    if dx <= tiny && dy <= tiny {
+        return Err(SceneError::at(
+            &to[0],
+            format!("{what} has no length"),
+            "`from` and `to` must differ in x or in y",
+        ));
+    }
+    let normal = usize::from(dx > dy);
+    let (s, t) = (a[1 - normal], b[1 - normal]);
+    Ok(Segment { normal, at: a[normal], from: s.min(t), to: s.max(t) })
+}
+
+impl Walls {
+    pub(super) fn new(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Walls> {
+        let mut errors = Vec::new();
+        let mut walls = Vec::new();
+        for w in &scene.walls {
+            let rotation = w.rotation.as_ref().map(|q| q.eval(scope)).transpose();
+            match (
+                axis_segment(&format!("wall `{}`", w.name), &w.from, &w.to, scope, domain),
+                rotation,
+            ) {
+                (Ok(segment), Ok(rotation)) => {
+                    walls.push(SiWall { name: w.name.clone(), segment, kind: w.kind, rotation });
+                }
+                (Err(e), _) | (_, Err(e)) => errors.push(e),
+            }
+        }
+        let mut blocks = Vec::new();
+        for b in &scene.blocks {
+            let (bx, by) = (pair(&b.x, scope)?, pair(&b.y, scope)?);
+            for (c, r) in [bx, by].into_iter().enumerate() {
+                if r[0] >= r[1] || r[0] < domain[c][0] || r[1] > domain[c][1] {
+                    errors.push(SceneError::at(
+                        if c == 0 { &b.x[0] } else { &b.y[0] },
+                        format!("block `{}` is empty or reaches outside the domain", b.name),
+                        "give [low, high] inside the domain",
+                    ));
+                }
+            }
+            blocks.push(([bx, by], b.kind));
+        }
+        SceneError::join(errors)?;
+        Ok(Walls { walls, blocks })
+    }
+
+    /// The lips of apertures: ends of walls that face each other across a gap. (Additional grading
+    /// towards the upper ends of the silo's side walls takes 1.6 times the cells and changes the
+    /// initial discharge by 1e-5.)
+    pub(super) fn lips(&self, domain: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
+        let tips = self.tips(domain);
+        tips.iter().filter(|t| tips.iter().any(|o| t.faces(o))).map(|t| t.at).collect()
+    }
+
+    /// Free ends of walls: they lie inside the domain and on no other wall.
+    pub(super) fn tips(&self, [x, y]: [[f64; 2]; 2]) -> Vec<Tip> {
+        let mut tips = Vec::new();
+        for (k, w) in self.walls.iter().enumerate() {
+            for (p, up) in w.segment.ends().into_iter().zip([false, true]) {
+                let tiny = 1e-9 * (x[1] - x[0]).max(y[1] - y[0]);
+                let inside = p[0] > x[0] + tiny
+                    && p[0] < x[1] - tiny
+                    && p[1] > y[0] + tiny
+                    && p[1] < y[1] - tiny;
+                let on_other = self.walls.iter().enumerate().any(|(m, o)| {
+                    let o = o.segment;
+                    m != k
+                        && (p[o.normal] - o.at).abs() <= tiny
+                        && p[1 - o.normal] >= o.from - tiny
+                        && p[1 - o.normal] <= o.to + tiny
+                });
+                if inside && !on_other {
+                    tips.push(Tip { at: p, normal: w.segment.normal, up });
+                }
+            }
+        }
+        tips
+    }
+
+    pub(super) fn enclosure(&self, scene: &Scene, mesh: &Mesh, units: &Units) -> Enclosure {
+        let l = units.length;
+        let mut obstacles: Vec<Segment> =
+            self.walls.iter().map(|w| w.segment.on_mesh(mesh, l)).collect();
+        for (range, _) in &self.blocks {
+            for normal in 0..2 {
+                for at in range[normal] {
+                    let [from, to] = range[1 - normal].map(|v| v / l);
+                    obstacles.push(Segment { normal, at: at / l, from, to });
+                }
+            }
+        }
+        let open = scene.boundaries.sides().map(|s| s.kind == BoundaryKind::Open);
+        Enclosure { obstacles, open }
+    }
+}
+
+/// A free end of a wall.
+pub(super) struct Tip {
+    pub(super) at: [f64; 2],
+    /// Direction of the normal of its wall.
+    normal: usize,
+    /// Whether it is the upper or right end.
+    up: bool,
+}
+
+impl Tip {
+    /// Whether both ends lie on one line and their walls lie outside the gap between them.
+    fn faces(&self, o: &Tip) -> bool {
+        let (n, t) = (self.normal, 1 - self.normal);
+        let distance = o.at[t] - self.at[t];
+        n == o.normal
+            && (o.at[n] - self.at[n]).abs() <= 1e-9 * distance.abs()
+            && self.up != o.up
+            && self.up == (distance > 0.0)
+    }
+}

@@ -1,0 +1,208 @@
+//! One step, start to end.
+
+use super::Integrator;
+use super::clock::{Limiter, next_step};
+use super::error::SimError;
+use super::phases::Phases;
+use super::simulation::{Before, Simulation};
+use crate::motion::advect;
+use crate::motion::carrier::Carrier;
+use crate::plan::When;
+use crate::space::population::Count;
+use std::time::Instant;
+
+/// A step is taken again, shorter, if its middle crosses this many times the cells it may.
+const SURPRISE: f64 = 4.0;
+
+impl<const D: usize> Simulation<D> {
+    /// Takes one step.
+    pub fn advance(&mut self) -> Result<(), SimError> {
+        let clock = Instant::now();
+        let mut seconds = Phases::default();
+        let speeds = self.speeds();
+        let (mut dt, mut limiter) =
+            next_step(&self.plan.clock, self.time, self.previous.as_ref().map(|p| p.dt), speeds);
+        if let Some(longest) = self.longest.map(|dt| dt / self.plan.units.time)
+            && dt > longest
+        {
+            (dt, limiter) = (longest, Limiter::Guard);
+        }
+        let mut extra = 0;
+        loop {
+            self.attempted = dt;
+            if dt.is_nan() || self.time + dt <= self.time {
+                let dt = dt * self.plan.units.time;
+                return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
+            }
+            extra += self.find_half_step_velocity(dt, &mut seconds)?;
+            // A flow that has hardly begun says nothing about its own middle of the step.
+            let crossed = dt * self.crossings(|node| self.half[node]);
+            let most = self.plan.clock.courant;
+            if crossed <= SURPRISE * most {
+                break;
+            }
+            (dt, limiter) = (dt * (most / crossed), Limiter::Courant);
+        }
+
+        let phase = Instant::now();
+        let plan = self.plan.clone();
+        let parts = self.parts(dt);
+        let Simulation { currents, half, matter, .. } = self;
+        let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
+        let part = dt / f64::from(parts);
+        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, currents, half, part);
+        for _ in 0..parts {
+            advect::advance(
+                &carrier,
+                &mut self.particles,
+                &mut self.journeys,
+                &plan.effects,
+                compliant,
+                &mut self.gauges,
+                &mut self.count,
+            );
+            if let Some(dye) = &mut self.dye {
+                let phase = Instant::now();
+                dye.advance(&carrier);
+                seconds.dye += phase.elapsed().as_secs_f64();
+            }
+        }
+        seconds.motion += phase.elapsed().as_secs_f64() - seconds.dye;
+        let phase = Instant::now();
+        self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
+        seconds.population += phase.elapsed().as_secs_f64();
+
+        self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
+        self.step += 1;
+        let changed = self.apply_changes();
+        let mut before = std::mem::take(&mut self.spare);
+        before.copy_from(&self.flow);
+        // After a sudden change the flow before says nothing about the one to come.
+        let ahead = (!changed).then(|| self.ahead(self.expected_step(dt)));
+        if let (Some(previous), false) = (&self.previous, changed) {
+            self.flow.extrapolate(&previous.flow, dt / previous.dt);
+        }
+        let solved = self.solve(ahead.flatten().map(|t| (t, &before)), &mut seconds);
+        let older = self.previous.take();
+        if changed {
+            self.spare = before;
+        } else {
+            self.previous = Some(Before { flow: before, dt });
+            self.spare = older.map(|o| o.flow).unwrap_or_default();
+        }
+        solved?;
+        self.measure(dt, limiter, seconds, extra + self.report.corrections, clock);
+        Ok(())
+    }
+
+    /// Parts in which points go through a velocity frozen for `dt`: one as long as none crosses
+    /// more than a cell, else parts of half a cell, for longer ways would crowd and thin out what a
+    /// flow without divergence keeps apart.
+    fn parts(&self, dt: f64) -> u32 {
+        let crossed = dt * self.crossings(|node| self.half[node]);
+        if crossed > 1.0 { (2.0 * crossed).ceil().min(1e4) as u32 } else { 1 }
+    }
+
+    pub(super) fn si_time(&self) -> f64 {
+        self.time * self.plan.units.time
+    }
+
+    fn next_stop(&self) -> f64 {
+        let clock = &self.plan.clock;
+        let later = |&&s: &&f64| s > self.time * (1.0 + 1e-14);
+        clock.stops.iter().find(later).copied().unwrap_or(clock.end)
+    }
+
+    /// Finds the velocity in the middle of a step of `dt`; corrections spent on it.
+    fn find_half_step_velocity(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
+        self.flow.translation(&mut self.half);
+        match (self.plan.method.integrator, &self.previous) {
+            (Integrator::Euler, _) => Ok(0),
+            (Integrator::Extrapolated, Some(before)) => {
+                let f = 0.5 * dt / before.dt;
+                for (u, b) in self.half.iter_mut().zip(&before.flow.velocity) {
+                    *u = [u[0] + f * (u[0] - b[0]), u[1] + f * (u[1] - b[1])];
+                }
+                Ok(0)
+            }
+            (Integrator::Extrapolated | Integrator::Midpoint, _) => {
+                self.solve_half_step(dt, seconds)
+            }
+        }
+    }
+
+    /// Moves a copy of the particles half a step with the velocity in `half`, solves there, and leaves
+    /// that velocity in `half`.
+    fn solve_half_step(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
+        let plan = self.plan.clone();
+        let phase = Instant::now();
+        let mut there = self.particles.clone();
+        let parts = self.parts(0.5 * dt);
+        let Simulation { currents, half, matter, journeys, .. } = self;
+        let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
+        let part = 0.5 * dt / f64::from(parts);
+        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, currents, half, part);
+        let (effects, no_gauges, mut ignored) = (&plan.effects, &mut [], Count::default());
+        for _ in 0..parts {
+            advect::advance(
+                &carrier,
+                &mut there,
+                journeys,
+                effects,
+                compliant,
+                no_gauges,
+                &mut ignored,
+            );
+        }
+        self.population.control(&plan.mesh, &mut there, &mut ignored);
+        seconds.motion += phase.elapsed().as_secs_f64();
+        let here = std::mem::replace(&mut self.particles, there);
+        let flow = self.flow.clone();
+        // At the first step a mode must at worst turn round: half a step ahead, neither more nor
+        // less, makes that the trapezoidal rule.
+        let ahead = self.ahead(dt).map(|t| if self.previous.is_none() { 0.5 * dt } else { t });
+        let solved = self.solve(ahead.map(|t| (t, &flow)), seconds);
+        std::mem::replace(&mut self.flow, flow).translation(&mut self.half);
+        self.particles = here;
+        solved?;
+        Ok(self.report.corrections)
+    }
+
+    /// Applies the changes of matter that are due; whether there were any.
+    pub(super) fn apply_changes(&mut self) -> bool {
+        self.events.clear();
+        let mut any = false;
+        let plan = self.plan.clone();
+        while let Some(change) = plan.changes.get(self.next_change) {
+            let due = match change.when {
+                When::Time(t) => t <= self.time * (1.0 + 1e-14),
+                When::Step(s) => s <= self.step,
+            };
+            if !due {
+                break;
+            }
+            let before = self.potential_energy();
+            self.matter = change.state.clone();
+            // A change of gravity does work on everything at once.
+            let jump = self.potential_energy() - before;
+            self.row.work += jump * self.plan.units.energy();
+            self.events.push(format!("step {}: {}", self.step, change.label));
+            self.version += 1;
+            self.next_change += 1;
+            any = true;
+        }
+        any
+    }
+
+    /// How far ahead restoring loads are taken, for a step of `dt`.
+    fn ahead(&self, dt: f64) -> Option<f64> {
+        let share = self.plan.method.stabilisation.filter(|_| self.matter.is_stratified());
+        share.map(|share| share * dt)
+    }
+
+    /// The step to come, as far as the flow before and the step before can tell.
+    fn expected_step(&self, dt: f64) -> f64 {
+        let (next, _) = next_step(&self.plan.clock, self.time, Some(dt), self.speeds());
+        if next > 0.0 { next } else { dt }
+    }
+}

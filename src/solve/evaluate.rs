@@ -1,0 +1,326 @@
+//! What a cell does: the laws of its materials at its integration points, mixtures and laminates,
+//! from what [`composition`](crate::composition) says is there.
+
+use super::element::{PointShape, rates};
+use super::laminate::{self, Cut};
+use super::quadrature::{CutStiffness, IntegrationPoint};
+use crate::composition::interface::Interface;
+use crate::composition::{Content, Gathered, Kind};
+use crate::laws::Here;
+use crate::laws::director::Orientation;
+use crate::laws::mixture::Mixture;
+use crate::laws::point::PointLaw;
+use crate::laws::rates::Rates;
+use crate::plan::material::Material;
+use crate::scene::Quadrature as Rule;
+use crate::space::flow::Flow;
+use crate::space::mesh::Mesh;
+use crate::space::particles::Particles;
+use crate::space::shape::{GAUSS_6X6, SUBPOINTS, Shape};
+use crate::threads::Divisible;
+
+/// Rates and pressure of the last iterate, for laws that depend on them.
+pub trait LastFlow: Sync {
+    /// At reference coordinates `r` of a cell, in the plan's units.
+    fn at(&self, cell: usize, r: [f64; 2]) -> (Rates, f64);
+}
+
+/// There is no iterate yet: no rates, no pressure.
+pub struct NoFlow;
+
+impl LastFlow for NoFlow {
+    fn at(&self, _: usize, _: [f64; 2]) -> (Rates, f64) {
+        (Rates::default(), 0.0)
+    }
+}
+
+impl<const D: usize> LastFlow for (&Mesh, &Flow<D>) {
+    fn at(&self, cell: usize, r: [f64; 2]) -> (Rates, f64) {
+        let (mesh, flow) = *self;
+        let shape = PointShape::new(&Shape::at(r), mesh.cell_size(cell));
+        let pressure = mesh.measure().pressure_basis(r);
+        let p = flow.pressure[cell].iter().zip(pressure).map(|(p, q)| p * q).sum();
+        (rates(&shape, &flow.of_cell(mesh, cell)), p)
+    }
+}
+
+/// The law of a material whose particles all are alike.
+pub fn uniform(m: &Material) -> PointLaw {
+    m.law.at(&Here::at_rest(m.viscosity, &Orientation::default()))
+}
+
+/// What cells are evaluated from.
+#[derive(Clone, Copy)]
+pub struct Evaluation<'a> {
+    pub rule: Rule,
+    pub mesh: &'a Mesh,
+    pub particles: &'a Particles,
+    pub materials: &'a [Material],
+    pub kinds: &'a [Kind],
+    pub content: &'a [Content],
+    pub factors: &'a [f64],
+    pub flow: &'a dyn LastFlow,
+}
+
+/// What some consecutive cells have, to be written.
+pub struct CellsMut<'a> {
+    pub materials: usize,
+    pub points: &'a mut [IntegrationPoint],
+    pub cut: &'a mut [Option<Box<CutStiffness>>],
+    pub mean_viscosity: &'a mut [f64],
+    pub compliance: &'a mut [f64],
+    pub fractions: &'a mut [f64],
+}
+
+/// What one cell has, to be written.
+pub struct CellMut<'a> {
+    points: &'a mut [IntegrationPoint],
+    cut: &'a mut Option<Box<CutStiffness>>,
+    mean_viscosity: &'a mut f64,
+    compliance: &'a mut f64,
+    fractions: &'a mut [f64],
+}
+
+impl Divisible for CellsMut<'_> {
+    fn cut(self, at: usize) -> (Self, Self) {
+        let materials = self.materials;
+        let (p0, p1) = self.points.split_at_mut(9 * at);
+        let (k0, k1) = self.cut.split_at_mut(at);
+        let (v0, v1) = self.mean_viscosity.split_at_mut(at);
+        let (c0, c1) = self.compliance.split_at_mut(at);
+        let (f0, f1) = self.fractions.split_at_mut(materials * at);
+        let part = |points, cut, mean_viscosity, compliance, fractions| CellsMut {
+            materials,
+            points,
+            cut,
+            mean_viscosity,
+            compliance,
+            fractions,
+        };
+        (part(p0, k0, v0, c0, f0), part(p1, k1, v1, c1, f1))
+    }
+}
+
+impl CellsMut<'_> {
+    /// The `k`th of these cells.
+    pub fn cell(&mut self, k: usize) -> CellMut<'_> {
+        CellMut {
+            points: &mut self.points[9 * k..9 * k + 9],
+            cut: &mut self.cut[k],
+            mean_viscosity: &mut self.mean_viscosity[k],
+            compliance: &mut self.compliance[k],
+            fractions: &mut self.fractions[k * self.materials..][..self.materials],
+        }
+    }
+}
+
+/// How the materials of a cell lie.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one at a time, and a box would be allocated"
+)]
+enum Form {
+    /// Two with an interface.
+    Cut { interface: Interface, between: [usize; 2] },
+    /// Drops in a material of the viscosity `around`.
+    Drops { around: f64 },
+    /// Unknown.
+    Mixture,
+}
+
+impl Evaluation<'_> {
+    /// Evaluates a cell.
+    pub fn evaluate(&self, cell: usize, mut out: CellMut, scratch: &mut Gathered) {
+        let kept = out.cut.take();
+        match self.content[cell] {
+            Content::Uniform { material, .. } => {
+                let m = &self.materials[material as usize];
+                *out.mean_viscosity = m.viscosity;
+                *out.compliance = m.law.compliance;
+                out.fractions.fill(0.0);
+                out.fractions[material as usize] = 1.0;
+                let law = uniform(m);
+                out.points.iter_mut().for_each(|p| p.law = law);
+            }
+            Content::Mixed => self.mix(cell, &mut out, kept, scratch),
+            Content::Solid | Content::Unknown => {}
+        }
+    }
+
+    fn mix(
+        &self,
+        cell: usize,
+        out: &mut CellMut,
+        kept: Option<Box<CutStiffness>>,
+        scratch: &mut Gathered,
+    ) {
+        scratch.gather(self.mesh, cell, self.particles, self.kinds);
+        scratch.fit_viscosities();
+        let form = match self.rule {
+            Rule::Laminate => self.form(cell, scratch),
+            Rule::Mixture | Rule::Particles => Form::Mixture,
+        };
+        let mixture = match form {
+            Form::Drops { around } => Mixture::around_drops(around),
+            Form::Cut { .. } | Form::Mixture => Mixture::default(),
+        };
+        scratch.match_volumes(self.factors);
+        self.points(cell, out, scratch, mixture);
+        if let Form::Cut { interface, between } = form {
+            let cut = self.laminate(cell, &interface, between, scratch);
+            // In parallel: the stiff part counts. With the mixture's mean as the
+            // scale of the penalty layers of contrast 1e8 do not converge.
+            let arithmetic = self.arithmetic_viscosity(scratch);
+            *out.mean_viscosity = cut.rest * *out.mean_viscosity + (1.0 - cut.rest) * arithmetic;
+            *out.cut = Some(match kept {
+                Some(mut kept) => {
+                    *kept = cut;
+                    kept
+                }
+                None => Box::new(cut),
+            });
+        }
+    }
+
+    /// What two materials form in a gathered cell.
+    fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
+        let viscosity: [f64; 2] = match present(scratch.volumes()) {
+            Some(between) => between.map(|m| self.viscosity_in_cell(cell, m, scratch)),
+            None => return Form::Mixture,
+        };
+        let Some(mut around) = scratch.neighbourhood(self.mesh, cell, self.particles) else {
+            return Form::Mixture;
+        };
+        for drop in [false, true] {
+            if around.is_drop(drop) {
+                return Form::Drops { around: viscosity[usize::from(!drop)] };
+            }
+        }
+        let between = around.between;
+        let sheet = around.sheet(viscosity[1] > viscosity[0]);
+        match sheet.or_else(|| around.interface()) {
+            Some(interface) => Form::Cut { interface, between },
+            None => Form::Mixture,
+        }
+    }
+
+    /// The law of a material at a point of a cell.
+    fn law(
+        &self,
+        (cell, r): (usize, [f64; 2]),
+        m: usize,
+        viscosity: f64,
+        orientation: &Orientation,
+    ) -> PointLaw {
+        let law = &self.materials[m].law;
+        let mut here = Here::at_rest(viscosity, orientation);
+        if law.depends_on().needs_flow() {
+            (here.rates, here.pressure) = self.flow.at(cell, r);
+        }
+        law.at(&here)
+    }
+
+    /// Carried or constant viscosity of a material at a point of a gathered cell.
+    fn viscosity(&self, m: usize, r: [f64; 2], scratch: &Gathered) -> f64 {
+        scratch.viscosity_at(m, r).unwrap_or(self.materials[m].viscosity)
+    }
+
+    /// Stiffness of a cell of two materials with an interface.
+    fn laminate(
+        &self,
+        cell: usize,
+        interface: &Interface,
+        between: [usize; 2],
+        scratch: &Gathered,
+    ) -> CutStiffness {
+        let sides = between.map(|m| self.law_in_cell(cell, m, scratch));
+        let size = self.mesh.cell_size(cell);
+        let mut matrix = laminate::matrix(&Cut { interface, sides: &sides, size });
+        matrix.iter_mut().flatten().for_each(|k| *k *= interface.trust);
+        CutStiffness { matrix, rest: 1.0 - interface.trust }
+    }
+
+    /// Mean viscosity of one material's law in the cell's middle.
+    fn viscosity_in_cell(&self, cell: usize, m: usize, scratch: &Gathered) -> f64 {
+        let eta = self.viscosity(m, [0.0; 2], scratch);
+        self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m)).shear.mean()
+    }
+
+    /// Mean viscosity of the cell's materials by volume.
+    fn arithmetic_viscosity(&self, scratch: &Gathered) -> f64 {
+        let total: f64 = scratch.volumes().iter().sum();
+        scratch.volumes().iter().zip(self.materials).map(|(v, m)| v / total * m.viscosity).sum()
+    }
+
+    /// Law of one material over the whole cell.
+    fn law_in_cell(&self, cell: usize, m: usize, scratch: &Gathered) -> [PointLaw; SUBPOINTS] {
+        let orientation = scratch.cell_orientation(m);
+        let material = &self.materials[m];
+        if !material.carries_viscosity && !material.law.depends_on().needs_flow() {
+            return [self.law((cell, [0.0; 2]), m, material.viscosity, orientation); SUBPOINTS];
+        }
+        std::array::from_fn(|q| {
+            let r = GAUSS_6X6[q].r;
+            self.law((cell, r), m, self.viscosity(m, r, scratch), orientation)
+        })
+    }
+
+    /// Fills the nine points of a cell, its fractions and means.
+    fn points(&self, cell: usize, out: &mut CellMut, scratch: &Gathered, empty: Mixture) {
+        out.fractions.fill(0.0);
+        (*out.mean_viscosity, *out.compliance) = (0.0, 0.0);
+        for (g, point) in out.points.iter_mut().enumerate() {
+            let mut mixture = empty;
+            for (m, material) in self.materials.iter().enumerate() {
+                let phi = scratch.share(m, g);
+                if phi == 0.0 {
+                    continue;
+                }
+                let eta = self.viscosity(m, point.r, scratch);
+                let law = self.law((cell, point.r), m, eta, scratch.orientation(m, g));
+                mixture.add(phi, &law);
+                out.fractions[m] += point.weight * phi;
+                *out.compliance += point.weight * phi * material.law.compliance;
+            }
+            point.law = mixture.law();
+            *out.mean_viscosity += point.weight * point.law.shear.mean();
+        }
+    }
+}
+
+/// The two materials that have a volume; `None` if there are more or fewer.
+fn present(volumes: &[f64]) -> Option<[usize; 2]> {
+    let mut present = (0..volumes.len()).filter(|&m| volumes[m] > 0.0);
+    match (present.next(), present.next(), present.next()) {
+        (Some(first), Some(second), None) => Some([first, second]),
+        _ => None,
+    }
+}
+
+/// A particle as an integration point of a cell whose particles have the volume `total`, and its
+/// viscosity.
+pub fn particle_point(
+    (mesh, cell): (&Mesh, usize),
+    (particles, p): (&Particles, usize),
+    m: &Material,
+    total: f64,
+    flow: &dyn LastFlow,
+) -> (f64, IntegrationPoint) {
+    let eta = match &particles.viscosity {
+        Some(v) if m.carries_viscosity => v[p],
+        _ => m.viscosity,
+    };
+    let density = match &particles.density {
+        Some(d) if m.carries_density => d[p],
+        _ => m.density,
+    };
+    let director = particles.director.as_ref().filter(|_| m.law.is_layered()).map(|d| d[p]);
+    let orientation = director.map_or(Orientation::default(), Orientation::of);
+    let r = mesh.to_reference(cell, particles.position[p]);
+    let mut here = Here::at_rest(eta, &orientation);
+    if m.law.depends_on().needs_flow() {
+        (here.rates, here.pressure) = flow.at(cell, r);
+    }
+    let weight = particles.volume[p] / total;
+    (eta, IntegrationPoint { law: m.law.at(&here), density, weight, r })
+}

@@ -1,0 +1,196 @@
+//! The residual of a state: what the forces and the divergence leave over, cell by cell, and the norms
+//! and powers that come with them.
+
+use super::problem::{CELL_GRAIN, Loads, Residual, Share, Stokes, Work};
+use super::quadrature::Quadrature;
+use super::terms::Terms;
+use super::terms::pressure::Divergence;
+use super::terms::viscous::{Internal, TOGETHER};
+use crate::space::flow::Flow;
+use crate::space::shape::{NODES, SIDE_NODES};
+use crate::threads;
+use std::ops::Range;
+
+/// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
+const RIGID_SHARE: f64 = 1e-3;
+
+/// Share of the pressure's forces in the scale of the residual, and of what the penalty makes of
+/// the pressure in that of the divergence: at the usual tolerance a unit or two in the last place of
+/// a pressure that is far larger than the stresses of the flow.
+pub(super) const PRESSURE_SHARE: f64 = 3e-4;
+
+/// Share of `||sqrt(D) u||^2` in that scale: far below the dissipation of a strained flow, above
+/// the rounding of a rigid one.
+const RIGID_POWER: f64 = 3e-2;
+
+impl<const D: usize> Stokes<D> {
+    pub(super) fn residual(
+        &self,
+        quadrature: &Quadrature,
+        Loads { nodal, terms }: Loads<D>,
+        flow: &Flow<D>,
+        work: &mut Work<D>,
+    ) {
+        let Work { residual: out, shares, .. } = work;
+        let cells = self.mesh.cells();
+        // Whole blocks; what is beyond the last cell stays zero.
+        shares.resize(cells.next_multiple_of(TOGETHER), Share::default());
+        let (blocks, _) = shares.as_chunks_mut::<TOGETHER>();
+        threads::for_each(blocks, CELL_GRAIN / TOGETHER, |block, shares| {
+            let first = block * TOGETHER;
+            self.residuals(first..cells.min(first + TOGETHER), quadrature, terms, flow, shares);
+        });
+        let shares = &shares[..cells];
+        let sums = threads::sum(0..shares.len(), |cell| shares[cell].sums);
+        [out.dissipation, out.strain, out.divergence_norm, out.restoring, ..] = sums;
+        [.., out.pressure_norm, out.yielding, out.pressure_square] = sums;
+        let cells = (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]);
+        out.stiffest = cells.map(|c| quadrature.mean_viscosity[c]).fold(0.0, f64::max);
+        out.divergence.clear();
+        out.divergence.extend(shares.iter().map(|s| s.divergence));
+        out.force.clear();
+        out.force.extend_from_slice(nodal);
+        self.incidence.add_up(&mut out.force, |cell, a| shares[cell].force[a]);
+        for term in terms.on_faces() {
+            for (index, face) in term.faces().iter().enumerate() {
+                let nodes = SIDE_NODES[face.side].map(|a| self.incidence.nodes[face.cell][a]);
+                let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
+                let (force, power) = term.force(index, nodes, u);
+                out.restoring += power;
+                for (node, f) in nodes.into_iter().zip(force) {
+                    out.force[node][0] += f[0];
+                    out.force[node][1] += f[1];
+                }
+            }
+        }
+    }
+
+    /// Of some cells that are computed together.
+    fn residuals(
+        &self,
+        cells: Range<usize>,
+        quadrature: &Quadrature,
+        terms: &Terms,
+        flow: &Flow<D>,
+        shares: &mut [Share<D>; TOGETHER],
+    ) {
+        let rotation = &self.matrices.rotation;
+        let internal = Internal::of_cells(self.simd, quadrature, rotation, cells.clone(), |cell| {
+            let u = self.incidence.nodes[cell].map(|n| flow.velocity[n]);
+            (!self.mesh.solid[cell]).then(|| (self.mesh.cell_measure(cell), u))
+        });
+        for (cell, (share, internal)) in cells.zip(shares.iter_mut().zip(&internal)) {
+            if !self.mesh.solid[cell] {
+                self.cell_residual(cell, internal, quadrature, terms, flow, share);
+            }
+        }
+    }
+
+    fn cell_residual(
+        &self,
+        cell: usize,
+        internal: &Internal<D>,
+        quadrature: &Quadrature,
+        terms: &Terms,
+        flow: &Flow<D>,
+        share: &mut Share<D>,
+    ) {
+        let nodes = &self.incidence.nodes[cell];
+        let measure = self.mesh.cell_measure(cell);
+        let u = nodes.map(|n| flow.velocity[n]);
+        let divergence = Divergence::new(measure);
+        let mass = measure.pressure_mass();
+        let pressure = flow.pressure[cell];
+        let compliance = quadrature.compliance[cell];
+        let mut force = [[0.0; D]; NODES];
+        divergence.add_transposed(&pressure, &mut force);
+        let mut pressure_norm = 0.0;
+        for (a, &node) in nodes.iter().enumerate() {
+            for c in 0..2 {
+                pressure_norm += force[a][c] * force[a][c] * self.inverse_diagonal[node][c];
+            }
+        }
+        let bu = divergence.apply(&u);
+        let [mut yielding, mut pressure_square, mut divergence_norm] = [0.0; 3];
+        for q in 0..3 {
+            let rp = bu[q] + compliance * mass[q] * pressure[q];
+            let needed = pressure[q] / self.matrices.cells[cell].penalty[q];
+            yielding += needed * needed / mass[q];
+            pressure_square += mass[q] * pressure[q] * pressure[q];
+            divergence_norm += rp * rp / mass[q];
+            share.divergence[q] = rp;
+        }
+        let dissipation = internal.dissipation + compliance * pressure_square;
+        for a in 0..NODES {
+            for c in 0..D {
+                force[a][c] -= internal.force[a][c];
+            }
+        }
+        let mut taken = 0.0;
+        for term in terms.on_cells().into_iter().filter(|t| t.acts_on(cell)) {
+            let along = u.map(|u| [u[0], u[1]]);
+            let (f, power) = term.force(cell, nodes, along);
+            taken += power;
+            for (force, f) in force.iter_mut().zip(f) {
+                force[0] += f[0];
+                force[1] += f[1];
+            }
+        }
+        share.force = force;
+        let [strain, norms] = [internal.strain, divergence_norm];
+        share.sums = [dissipation, strain, norms, taken, pressure_norm, yielding, pressure_square];
+    }
+
+    /// Scaled residual, relative divergence, what the penalty makes of the pressure relative to the
+    /// same scale, and a scale of power.
+    pub(super) fn norms(
+        &self,
+        r: &Residual<D>,
+        load: &[[f64; D]],
+        flow: &Flow<D>,
+    ) -> (f64, f64, f64, f64) {
+        let [rr, ff, uu] = threads::sum(0..self.mesh.nodes(), |node| {
+            let mut sums = [0.0; 3];
+            for c in 0..D {
+                let d = self.diagonal[node][c];
+                if d == 0.0 {
+                    continue;
+                }
+                sums[2] += d * flow.velocity[node][c].powi(2);
+                if !self.constraints.is_fixed(node, c) {
+                    let inverse = self.inverse_diagonal[node][c];
+                    sums[0] += r.force[node][c].powi(2) * inverse;
+                    sums[1] += load[node][c].powi(2) * inverse;
+                }
+            }
+            sums
+        });
+        // The last two terms keep the ratio sensible when nothing moves, and in a rigid rotation,
+        // where divergence and strain are both rounding.
+        let scale = ff.sqrt() + uu.sqrt() + PRESSURE_SHARE * r.pressure_norm.sqrt();
+        let strain = r.strain.sqrt() + ff.sqrt() + RIGID_SHARE * uu.sqrt();
+        let ratio = |a: f64, b: f64| if a == 0.0 { 0.0 } else { a / b };
+        let stiffest = r.stiffest.max(f64::MIN_POSITIVE);
+        (
+            ratio(rr.sqrt(), scale),
+            ratio(r.divergence_norm.sqrt(), strain),
+            ratio(r.yielding.sqrt(), strain),
+            ff + RIGID_POWER * uu + r.pressure_square / stiffest,
+        )
+    }
+
+    /// Power of the loads and of the reactions on moving boundaries.
+    pub(super) fn power_in(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> f64 {
+        let [power] = threads::sum(0..self.mesh.nodes(), |node| {
+            let (u, mut power) = (flow.velocity[node], 0.0);
+            for c in 0..D {
+                power += load[node][c] * u[c];
+                if self.constraints.is_fixed(node, c) {
+                    power -= r.force[node][c] * u[c];
+                }
+            }
+            [power]
+        });
+        power
+    }
+}

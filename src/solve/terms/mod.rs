@@ -1,0 +1,92 @@
+//! The terms of the balances of momentum and angular momentum: one file states one formula and owns
+//! its contribution to matrix, load and power.
+//!
+//! | term | file | matrix | load |
+//! |---|---|---|---|
+//! | stresses of the materials | [`viscous`] | yes | |
+//! | coupling beyond the shear viscosity | [`rotation`] | yes | |
+//! | pressure and incompressibility | [`pressure`] | penalty | |
+//! | weight of the materials | [`weight`] | | yes |
+//! | stable strata ahead of time | [`restoring`] | yes | yes |
+//! | body forces and tractions fixed in space | [`plan::loads`](crate::plan::loads) | | yes |
+//!
+//! The first three exist in every cell and are called by name. [`Terms`] lists those that only some
+//! scenes have: what the plan does not call for is not in the list.
+
+pub mod pressure;
+pub mod restoring;
+pub mod rotation;
+pub mod viscous;
+pub mod weight;
+
+use crate::plan::Plan;
+use crate::space::shape::NODES;
+use restoring::Restoring;
+
+/// A term over whole cells that acts on velocities, symmetric and positive.
+pub trait CellTerm: Send + Sync {
+    /// Whether it contributes to a cell.
+    fn acts_on(&self, cell: usize) -> bool;
+
+    /// Entry of a cell's matrix for nodes `a`, `b` and components `c`, `d`.
+    fn entry(&self, cell: usize, nodes: [usize; 2], components: [usize; 2]) -> f64;
+
+    /// Forces on the nodes of a cell whose velocities are `u`, and the power that they take from the
+    /// flow.
+    fn force(
+        &self,
+        cell: usize,
+        nodes: &[usize; NODES],
+        u: [[f64; 2]; NODES],
+    ) -> ([[f64; 2]; NODES], f64);
+}
+
+/// A side of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellFace {
+    /// The cell whose matrix takes the term.
+    pub cell: usize,
+    /// Index into [`SIDE_NODES`](crate::space::shape::SIDE_NODES): left, right, bottom, top.
+    pub side: usize,
+}
+
+/// A term on faces that acts on velocities, symmetric and positive.
+pub trait FaceTerm: Send + Sync {
+    /// The faces on which it acts, in ascending order of their cells.
+    fn faces(&self) -> &[CellFace];
+
+    /// Entry of the matrix for the `k`th and `l`th node of a face and components `c`, `d`; `face`
+    /// counts in [`FaceTerm::faces`].
+    fn entry(&self, face: usize, nodes: [usize; 2], components: [usize; 2]) -> f64;
+
+    /// Forces on the nodes of a face whose velocities are `u`, and the power that they take from the
+    /// flow.
+    fn force(&self, face: usize, nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], f64);
+}
+
+/// Terms that only some scenes have.
+#[derive(Default)]
+pub struct Terms {
+    /// Stable stratification at large steps.
+    pub restoring: Restoring,
+    /// Terms on faces that do not change during a run.
+    faces: Vec<Box<dyn FaceTerm>>,
+}
+
+impl Terms {
+    /// The terms that a plan calls for.
+    pub fn of(_plan: &Plan) -> Self {
+        Terms { restoring: Restoring::default(), faces: vec![] }
+    }
+
+    /// All terms over cells.
+    pub fn on_cells(&self) -> [&dyn CellTerm; 1] {
+        [&self.restoring]
+    }
+
+    /// All terms on faces.
+    pub fn on_faces(&self) -> impl Iterator<Item = &dyn FaceTerm> {
+        let restoring: &dyn FaceTerm = &self.restoring;
+        std::iter::once(restoring).chain(self.faces.iter().map(|f| f.as_ref()))
+    }
+}

@@ -1,0 +1,85 @@
+//! The pressure term, `-p div u~ - p~ div u`: the divergence matrix of the pressure basis, and the
+//! penalty of the augmented Lagrangian.
+//!
+//! ```text
+//! B_qa = integral q d/dx N_a  (and d/dy),   force B' p,   residual B u + C p,   penalty B' W B
+//! ```
+//! The discontinuous linear pressure of a cell is eliminated with it; see
+//! [`stokes`](crate::solve::stokes).
+
+use crate::solve::element::{Matrix, Nodal};
+use crate::space::measure::CellMeasure;
+use crate::space::shape::{D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, NODES, Table};
+
+/// `integral q d/dx N` and `integral q d/dy N` on a cell: the divergence matrix of the pressure
+/// basis `1, xi, eta`, as tables of the reference cell and what they are multiplied with.
+#[derive(Clone, Copy)]
+pub struct Divergence {
+    x_scale: f64,
+    y_scale: f64,
+}
+
+/// The matrices of a cell of size 2 x 2 for `d/dx` and `d/dy`, divided by its area.
+static REFERENCE_DIVERGENCE: [[[f64; NODES]; 3]; 2] =
+    [reference_divergence(&D_XI_AT_GAUSS), reference_divergence(&D_ETA_AT_GAUSS)];
+
+const fn reference_divergence(slope: &Table) -> [[f64; NODES]; 3] {
+    let mut b = [[0.0; NODES]; 3];
+    let mut k = 0;
+    while k < 81 {
+        let (g, a) = (k / 9, k % 9);
+        let weighted = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3] * slope[g][a];
+        b[0][a] += weighted;
+        b[1][a] += GAUSS_3[g % 3] * weighted;
+        b[2][a] += GAUSS_3[g / 3] * weighted;
+        k += 1;
+    }
+    b
+}
+
+impl Divergence {
+    /// The divergence matrix of a cell.
+    pub fn new(cell: CellMeasure) -> Self {
+        let [x_scale, y_scale] = cell.divergence_scales();
+        Divergence { x_scale, y_scale }
+    }
+
+    /// `B u`
+    pub fn apply<const D: usize>(&self, u: &Nodal<D>) -> [f64; 3] {
+        let [x, y] = &REFERENCE_DIVERGENCE;
+        let mut sum = [[0.0; 3]; 2];
+        for a in 0..NODES {
+            for q in 0..3 {
+                sum[0][q] += x[q][a] * u[a][0];
+                sum[1][q] += y[q][a] * u[a][1];
+            }
+        }
+        std::array::from_fn(|q| self.x_scale * sum[0][q] + self.y_scale * sum[1][q])
+    }
+
+    /// `f += B^T p`
+    pub fn add_transposed<const D: usize>(&self, p: &[f64; 3], f: &mut Nodal<D>) {
+        let [x, y] = &REFERENCE_DIVERGENCE;
+        let (px, py) = (p.map(|p| self.x_scale * p), p.map(|p| self.y_scale * p));
+        for a in 0..NODES {
+            f[a][0] += x[0][a] * px[0] + x[1][a] * px[1] + x[2][a] * px[2];
+            f[a][1] += y[0][a] * py[0] + y[1][a] * py[1] + y[2][a] * py[2];
+        }
+    }
+
+    /// `k += B^T diag(w) B`, on and below the diagonal of components.
+    pub fn add_penalty(&self, w: &[f64; 3], k: &mut Matrix) {
+        let [x, y] = &REFERENCE_DIVERGENCE;
+        for q in 0..3 {
+            let bx = x[q].map(|v| v * self.x_scale);
+            let by = y[q].map(|v| v * self.y_scale);
+            for a in 0..NODES {
+                for b in 0..NODES {
+                    k[a][b] += w[q] * bx[a] * bx[b];
+                    k[NODES + a][b] += w[q] * by[a] * bx[b];
+                    k[NODES + a][NODES + b] += w[q] * by[a] * by[b];
+                }
+            }
+        }
+    }
+}

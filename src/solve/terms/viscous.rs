@@ -1,0 +1,500 @@
+//! The viscous term: stresses of the materials at the integration points of a cell.
+//!
+//! Per volume, with `d = (D_xx - D_yy, 2 D_xy)` and the spin `o = (v,x - u,y)/2`,
+//!
+//! ```text
+//! d.S d~ + beta tr(D) tr(D~) + 4 eta_c (o - w)(o~ - w~) + M grad w . grad w~
+//! ```
+//! Of the coupling viscosity only what does not exceed the shear viscosity is integrated point by
+//! point; [`rotation`](super::rotation) does the rest. Forces of cells whose points are those of the
+//! Gauss rule are computed eight cells at a time by sum factorisation.
+
+use super::rotation::RotationModes;
+use crate::composition::Content;
+use crate::laws::point::{PointLaw, Sym2};
+use crate::laws::rates::Rates;
+use crate::simd::{Simd, dispatch, multiply_add};
+use crate::solve::element::{Gradient, Matrix, Nodal, PointShape, rates};
+use crate::solve::quadrature::{CutStiffness, IntegrationPoint, Quadrature};
+use crate::space::measure::CellMeasure;
+use crate::space::shape::{GAUSS_3_WEIGHTS, NODES, SLOPES_AT_GAUSS, VALUES_AT_GAUSS};
+
+/// Stresses at a point times its volume, by what they are conjugate to: their virtual power is
+/// `sum_c x[c] du_c/dx + y[c] du_c/dy + w w~`.
+#[derive(Clone, Copy)]
+pub struct Stress<const D: usize> {
+    x: [f64; D],
+    y: [f64; D],
+    w: f64,
+}
+
+impl<const D: usize> Stress<D> {
+    #[inline(always)]
+    pub fn new(law: &PointLaw, r: &Rates, volume: f64) -> Self {
+        let stress = law.stress(r, volume);
+        let ([t0, t1], t2) = (stress.deviator, stress.mean);
+        let t3 = if D == 3 { stress.skew } else { 0.0 };
+        let mut out = Stress { x: [0.0; D], y: [0.0; D], w: -t3 };
+        (out.x[0], out.y[0]) = (t2 + t0, t1 - 0.5 * t3);
+        (out.x[1], out.y[1]) = (t1 + 0.5 * t3, t2 - t0);
+        if D == 3 {
+            (out.x[D - 1], out.y[D - 1]) = (stress.couple[0], stress.couple[1]);
+        }
+        out
+    }
+
+    /// Adds the virtual power to the nodal forces.
+    pub fn add_force(&self, s: &PointShape, f: &mut Nodal<D>) {
+        for a in 0..NODES {
+            for c in 0..D {
+                f[a][c] += self.x[c] * s.gx[a] + self.y[c] * s.gy[a];
+            }
+            if D == 3 {
+                f[a][D - 1] += self.w * s.n[a];
+            }
+        }
+    }
+}
+
+/// What a cell's stresses do: nodal forces, and powers that come with them.
+#[derive(Clone, Copy)]
+pub struct Internal<const D: usize> {
+    pub force: Nodal<D>,
+    pub dissipation: f64,
+    /// `integral D:D`
+    pub strain: f64,
+}
+
+impl<const D: usize> Internal<D> {
+    const NONE: Self = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
+
+    /// Of up to [`TOGETHER`] cells. `rotation`: of all cells; `of(cell)`: its measure and nodal values, `None`
+    /// for a solid one.
+    pub fn of_cells(
+        simd: Simd,
+        quadrature: &Quadrature,
+        rotation: &[Option<Box<RotationModes>>],
+        cells: std::ops::Range<usize>,
+        of: impl Fn(usize) -> Option<(CellMeasure, Nodal<D>)>,
+    ) -> [Self; TOGETHER] {
+        let mut out = [Internal::NONE; TOGETHER];
+        let mut together = Together::<D>::EMPTY;
+        let mut any = false;
+        for (k, cell) in cells.clone().enumerate() {
+            let Some((measure, u)) = of(cell) else { continue };
+            let Some(points) = quadrature.gauss_points(cell) else {
+                out[k] = Internal::at_any_points(quadrature, cell, measure, &u);
+                continue;
+            };
+            any = true;
+            if let Content::Uniform { .. } = quadrature.content(cell) {
+                let law = points[0].law.without_excess();
+                together.set(k, measure, &u, |_| law);
+                continue;
+            }
+            let rest = quadrature.cut(cell).map(|cut| cut.rest);
+            together.set(k, measure, &u, |g| {
+                let law = points[g].law.without_excess();
+                rest.map_or(law, |rest| law.with_viscosity_scaled(rest))
+            });
+        }
+        if any {
+            stresses(simd, &mut together);
+        }
+        for (k, cell) in cells.enumerate() {
+            if quadrature.gauss_points(cell).is_some() {
+                out[k] = together.internal(k);
+            }
+            let (cut, modes) = (quadrature.cut(cell), &rotation[cell]);
+            if cut.is_none() && modes.is_none() {
+                continue;
+            }
+            let Some((_, u)) = of(cell) else { continue };
+            cut.iter().for_each(|cut| out[k].add_cut(cut, &u));
+            if let Some(modes) = modes {
+                out[k].dissipation += modes.add_force(&u, &mut out[k].force);
+            }
+        }
+        out
+    }
+
+    fn add_cut(&mut self, cut: &CutStiffness, u: &Nodal<D>) {
+        let flat: [f64; 2 * NODES] = std::array::from_fn(|j| u[j % NODES][j / NODES]);
+        for (i, row) in cut.matrix.iter().enumerate() {
+            let force: f64 = row.iter().zip(&flat).map(|(k, u)| k * u).sum();
+            self.force[i % NODES][i / NODES] += force;
+            self.dissipation += force * flat[i];
+        }
+    }
+
+    fn at_any_points(
+        quadrature: &Quadrature,
+        cell: usize,
+        measure: CellMeasure,
+        u: &Nodal<D>,
+    ) -> Self {
+        let mut out = Internal::NONE;
+        quadrature.for_points(cell, |p, shape| {
+            let s = PointShape::new(shape, measure.size);
+            let p = IntegrationPoint { law: p.law.without_excess(), ..*p };
+            out.stress(&p, &rates(&s, u), measure).add_force(&s, &mut out.force);
+        });
+        out
+    }
+
+    /// Stress at a point, whose powers are added.
+    #[inline(always)]
+    fn stress(&mut self, p: &IntegrationPoint, r: &Rates, measure: CellMeasure) -> Stress<D> {
+        let volume = measure.times(p.weight);
+        self.dissipation += volume * p.law.power(r);
+        self.strain += volume * r.strain_squared();
+        Stress::new(&p.law, r, volume)
+    }
+}
+
+/// Cells whose stresses are computed together, one to a place of a vector.
+pub const TOGETHER: usize = 8;
+
+/// A number of each of them.
+type Lanes = [f64; TOGETHER];
+
+/// Cells whose points are those of the Gauss rule: nodal values, then nodal forces.
+struct Together<const D: usize> {
+    /// By component and node.
+    nodal: [[Lanes; NODES]; D],
+    laws: [LawLanes; 9],
+    /// Reference coordinates per length.
+    per_length: [Lanes; 2],
+    volume: Lanes,
+    dissipation: Lanes,
+    strain: Lanes,
+}
+
+/// A [`PointLaw`] of each cell.
+#[derive(Clone, Copy)]
+struct LawLanes {
+    shear: [Lanes; 3],
+    dilation: Lanes,
+    coupling: Lanes,
+    couple: Lanes,
+}
+
+const ZERO: Lanes = [0.0; TOGETHER];
+
+impl LawLanes {
+    const ZERO: Self = LawLanes { shear: [ZERO; 3], dilation: ZERO, coupling: ZERO, couple: ZERO };
+
+    #[inline(always)]
+    fn set(&mut self, k: usize, law: &PointLaw) {
+        let Sym2 { a, b, c } = law.shear;
+        (self.shear[0][k], self.shear[1][k], self.shear[2][k]) = (a, b, c);
+        self.dilation[k] = law.dilation;
+        self.coupling[k] = law.coupling;
+        self.couple[k] = law.couple;
+    }
+
+    #[inline(always)]
+    fn get(&self, k: usize) -> PointLaw {
+        PointLaw {
+            shear: Sym2 { a: self.shear[0][k], b: self.shear[1][k], c: self.shear[2][k] },
+            dilation: self.dilation[k],
+            coupling: self.coupling[k],
+            couple: self.couple[k],
+        }
+    }
+}
+
+impl<const D: usize> Together<D> {
+    /// Places that no cell takes have no stiffness.
+    const EMPTY: Self = Together {
+        nodal: [[ZERO; NODES]; D],
+        laws: [LawLanes::ZERO; 9],
+        per_length: [ZERO; 2],
+        volume: ZERO,
+        dissipation: ZERO,
+        strain: ZERO,
+    };
+
+    /// `law(g)`: at the Gauss points.
+    fn set(&mut self, k: usize, cell: CellMeasure, u: &Nodal<D>, law: impl Fn(usize) -> PointLaw) {
+        for a in 0..NODES {
+            for c in 0..D {
+                self.nodal[c][a][k] = u[a][c];
+            }
+        }
+        self.volume[k] = cell.volume();
+        for c in 0..2 {
+            self.per_length[c][k] = 2.0 / cell.size[c];
+        }
+        self.laws.iter_mut().enumerate().for_each(|(g, place)| place.set(k, &law(g)));
+    }
+
+    fn internal(&self, k: usize) -> Internal<D> {
+        let mut out =
+            Internal { dissipation: self.dissipation[k], strain: self.strain[k], ..Internal::NONE };
+        for a in 0..NODES {
+            for c in 0..D {
+                out.force[a][c] = self.nodal[c][a][k];
+            }
+        }
+        out
+    }
+}
+
+dispatch! {
+    /// Forces and powers of cells.
+    fn stresses<const D: usize>(cells: &mut Together<D>) = stresses_kernel
+}
+
+#[inline(always)]
+fn stresses_kernel<const LENGTH: usize, const FMA: bool, const D: usize>(cells: &mut Together<D>) {
+    let (mut x, mut y, mut w) = ([[ZERO; 9]; D], [[ZERO; 9]; D], [ZERO; 9]);
+    for c in 0..D {
+        let (values, slopes) = up::<FMA>(&cells.nodal[c]);
+        x[c] = across::<FMA>(&SLOPES_AT_GAUSS, &values);
+        y[c] = across::<FMA>(&VALUES_AT_GAUSS, &slopes);
+        if c == 2 {
+            w = across::<FMA>(&VALUES_AT_GAUSS, &values);
+        }
+    }
+    let [px, py] = cells.per_length;
+    for g in 0..9 {
+        let weight = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3];
+        for k in 0..TOGETHER {
+            let mut gradient = Gradient { x: [0.0; D], y: [0.0; D], w: w[g][k] };
+            for c in 0..D {
+                gradient.x[c] = x[c][g][k] * px[k];
+                gradient.y[c] = y[c][g][k] * py[k];
+            }
+            let (rates, law) = (gradient.rates(), cells.laws[g].get(k));
+            let volume = weight * cells.volume[k];
+            cells.dissipation[k] += volume * law.power(&rates);
+            cells.strain[k] += volume * rates.strain_squared();
+            let stress = Stress::<D>::new(&law, &rates, volume);
+            for c in 0..D {
+                x[c][g][k] = stress.x[c] * px[k];
+                y[c][g][k] = stress.y[c] * py[k];
+            }
+            w[g][k] = stress.w;
+        }
+    }
+    for c in 0..D {
+        let along = across::<FMA>(&transposed(&SLOPES_AT_GAUSS), &x[c]);
+        let other = across::<FMA>(&transposed(&VALUES_AT_GAUSS), &y[c]);
+        cells.nodal[c] = down::<FMA>(&along, &other);
+        if c == 2 {
+            let value = across::<FMA>(&transposed(&VALUES_AT_GAUSS), &w);
+            add_rows::<FMA>(&mut cells.nodal[c], &transposed(&VALUES_AT_GAUSS), &value);
+        }
+    }
+}
+
+type Rows = [[f64; 3]; 3];
+
+const fn transposed(t: &Rows) -> Rows {
+    let [[a, b, c], [d, e, f], [g, h, i]] = *t;
+    [[a, d, g], [b, e, h], [c, f, i]]
+}
+
+/// Each row of three contracted: `out[3 j + i] = sum_a table[i][a] v[3 j + a]`.
+#[inline(always)]
+fn across<const FMA: bool>(table: &Rows, v: &[Lanes; 9]) -> [Lanes; 9] {
+    let mut out = [ZERO; 9];
+    for j in 0..3 {
+        for i in 0..3 {
+            for a in 0..3 {
+                for k in 0..TOGETHER {
+                    let sum = out[3 * j + i][k];
+                    out[3 * j + i][k] = multiply_add::<FMA>(table[i][a], v[3 * j + a][k], sum);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Adds columns contracted: `out[3 j + i] += sum_b table[j][b] v[3 b + i]`.
+#[inline(always)]
+fn add_rows<const FMA: bool>(out: &mut [Lanes; 9], table: &Rows, v: &[Lanes; 9]) {
+    for j in 0..3 {
+        for b in 0..3 {
+            for i in 0..3 {
+                for k in 0..TOGETHER {
+                    let sum = out[3 * j + i][k];
+                    out[3 * j + i][k] = multiply_add::<FMA>(table[j][b], v[3 * b + i][k], sum);
+                }
+            }
+        }
+    }
+}
+
+/// Nodal values at the heights of the Gauss points, and their slopes there.
+#[inline(always)]
+fn up<const FMA: bool>(v: &[Lanes; 9]) -> ([Lanes; 9], [Lanes; 9]) {
+    let (mut values, mut slopes) = ([ZERO; 9], [ZERO; 9]);
+    add_rows::<FMA>(&mut values, &VALUES_AT_GAUSS, v);
+    add_rows::<FMA>(&mut slopes, &SLOPES_AT_GAUSS, v);
+    (values, slopes)
+}
+
+/// The transpose of [`up`].
+#[inline(always)]
+fn down<const FMA: bool>(values: &[Lanes; 9], slopes: &[Lanes; 9]) -> [Lanes; 9] {
+    let mut out = [ZERO; 9];
+    add_rows::<FMA>(&mut out, &transposed(&VALUES_AT_GAUSS), values);
+    add_rows::<FMA>(&mut out, &transposed(&SLOPES_AT_GAUSS), slopes);
+    out
+}
+
+/// Adds the stiffness of a point of volume `volume` to the element matrix: only blocks of
+/// components on and below the diagonal; [`mirror`] completes them.
+pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &PointLaw, volume: f64) {
+    for component in 0..D {
+        for a in 0..NODES {
+            let mut g = Gradient { x: [0.0; D], y: [0.0; D], w: 0.0 };
+            (g.x[component], g.y[component]) = (s.gx[a], s.gy[a]);
+            if component == 2 {
+                g.w = s.n[a];
+            }
+            // The stress of a unit value of this unknown; what it does to others is the row.
+            let t = Stress::<D>::new(law, &g.rates(), volume);
+            let row = &mut k[NODES * component + a];
+            for c in 0..=component {
+                for b in 0..NODES {
+                    row[NODES * c + b] += t.x[c] * s.gx[b] + t.y[c] * s.gy[b];
+                }
+            }
+            if component == 2 {
+                for b in 0..NODES {
+                    row[2 * NODES + b] += t.w * s.n[b];
+                }
+            }
+        }
+    }
+}
+
+/// Adds the stiffness of a cut cell, on and below the diagonal of components.
+pub fn add_cut_stiffness(k: &mut Matrix, cut: &CutStiffness) {
+    for (i, row) in cut.matrix.iter().enumerate() {
+        for j in 0..NODES * (i / NODES + 1) {
+            k[i][j] += row[j];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::element::{LOCAL, mirror};
+    use crate::space::measure::Measure;
+    use crate::space::shape::{GAUSS_3X3, GaussPoint, Shape};
+
+    const SIZE: [f64; 2] = [0.7, 1.3];
+
+    /// Nine points with different anisotropic laws that have every term.
+    fn points() -> [IntegrationPoint; 9] {
+        std::array::from_fn(|g| {
+            let t = g as f64;
+            let law = PointLaw {
+                shear: Sym2 { a: 2.0 + 0.3 * t, b: 1.0 + 0.1 * t, c: 0.4 - 0.1 * t },
+                dilation: 1.5 + 0.2 * t,
+                coupling: 0.8 + 0.05 * t,
+                couple: 0.3 + 0.02 * t,
+            };
+            let GaussPoint { weight, r, .. } = GAUSS_3X3[g];
+            IntegrationPoint { law, density: 1.0, weight, r }
+        })
+    }
+
+    fn stiffness<const D: usize>() -> Matrix {
+        let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
+        for (p, g) in points().iter().zip(GAUSS_3X3.iter()) {
+            let volume = p.weight * SIZE[0] * SIZE[1];
+            add_stiffness::<D>(&mut k, &PointShape::new(&g.shape, SIZE), &p.law, volume);
+        }
+        mirror::<D>(&mut k);
+        k
+    }
+
+    fn some_values<const D: usize>() -> Nodal<D> {
+        std::array::from_fn(|a| std::array::from_fn(|c| ((3 * a + 7 * c) as f64).sin()))
+    }
+
+    /// Of one of some cells that are computed together.
+    fn internal_at<const D: usize>(simd: Simd, lane: usize, u: &Nodal<D>) -> Internal<D> {
+        let mut cells = Together::<D>::EMPTY;
+        let points = points();
+        cells.set(lane, Measure::PLANE.of_cell(SIZE), u, |g| points[g].law);
+        stresses(simd, &mut cells);
+        let none = cells.internal((lane + 1) % TOGETHER);
+        assert!(none.force.iter().flatten().all(|&f| f == 0.0));
+        cells.internal(lane)
+    }
+
+    /// The loop over points that [`Together`] replaces.
+    fn force_point_by_point<const D: usize>(u: &Nodal<D>) -> Nodal<D> {
+        let mut f = [[0.0; D]; NODES];
+        for p in points() {
+            let s = PointShape::new(&Shape::at(p.r), SIZE);
+            let volume = p.weight * SIZE[0] * SIZE[1];
+            Stress::new(&p.law, &rates(&s, u), volume).add_force(&s, &mut f);
+        }
+        f
+    }
+
+    fn stiffness_times_vector_is_the_internal_force<const D: usize>() {
+        let (k, u) = (stiffness::<D>(), some_values::<D>());
+        for simd in crate::simd::all() {
+            for lane in [0, 5] {
+                let internal = internal_at(simd, lane, &u);
+                internal_force_is_that_of_the_stiffness(&k, &u, &internal);
+            }
+        }
+    }
+
+    fn internal_force_is_that_of_the_stiffness<const D: usize>(
+        k: &Matrix,
+        u: &Nodal<D>,
+        internal: &Internal<D>,
+    ) {
+        let by_point = force_point_by_point(u);
+        let mut power = 0.0;
+        for a in 0..NODES {
+            for c in 0..D {
+                let row = &k[NODES * c + a];
+                let ku: f64 = (0..NODES * D).map(|j| row[j] * u[j % NODES][j / NODES]).sum();
+                assert!((ku - internal.force[a][c]).abs() < 1e-12, "node {a}, component {c}");
+                assert!((ku - by_point[a][c]).abs() < 1e-12, "node {a}, component {c}");
+                power += ku * u[a][c];
+            }
+        }
+        assert!((power - internal.dissipation).abs() < 1e-12 * power);
+    }
+
+    #[test]
+    fn stiffness_and_internal_force_agree() {
+        stiffness_times_vector_is_the_internal_force::<2>();
+        stiffness_times_vector_is_the_internal_force::<3>();
+    }
+
+    #[test]
+    fn stiffness_is_symmetric() {
+        let k = stiffness::<3>();
+        for i in 0..LOCAL {
+            for j in 0..i {
+                assert!((k[i][j] - k[j][i]).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn a_rigid_rotation_with_matching_w_makes_no_force() {
+        let u: Nodal<3> = std::array::from_fn(|a| {
+            let (x, y) = ((a % 3) as f64 * 0.5 * SIZE[0], (a / 3) as f64 * 0.5 * SIZE[1]);
+            [-0.9 * y + 0.2, 0.9 * x - 0.1, 0.9]
+        });
+        let internal = internal_at(Simd::detect(), 0, &u);
+        assert!(internal.force.iter().flatten().all(|f| f.abs() < 1e-13));
+        assert!(internal.dissipation < 1e-25);
+    }
+}

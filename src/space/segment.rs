@@ -1,0 +1,68 @@
+//! This module defines segments along a coordinate direction, which represent walls, sides of
+//! blocks and gauges.
+
+use super::mesh::{Axis, Mesh};
+
+/// A segment along a coordinate direction; its owner defines the unit of length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Direction of the normal: 0 for x (vertical segment), 1 for y (horizontal segment).
+    pub normal: usize,
+    /// Coordinate of the segment along the normal.
+    pub at: f64,
+    /// Coordinate of the lower or left end.
+    pub from: f64,
+    /// Coordinate of the upper or right end.
+    pub to: f64,
+}
+
+impl Segment {
+    /// The point on the line of the segment whose other coordinate is `along`.
+    pub fn point(&self, along: f64) -> [f64; 2] {
+        if self.normal == 0 { [self.at, along] } else { [along, self.at] }
+    }
+
+    /// The two end points, in ascending order.
+    pub fn ends(&self) -> [[f64; 2]; 2] {
+        [self.point(self.from), self.point(self.to)]
+    }
+
+    /// The mesh lines that the segment requires, as (direction of the normal, coordinate): one
+    /// along the segment and one through each end.
+    pub fn lines(&self) -> [(usize, f64); 3] {
+        [(self.normal, self.at), (1 - self.normal, self.from), (1 - self.normal, self.to)]
+    }
+
+    /// The segment with all coordinates multiplied by `factor`.
+    pub fn scaled(&self, factor: f64) -> Segment {
+        let [at, from, to] = [self.at, self.from, self.to].map(|v| v * factor);
+        Segment { normal: self.normal, at, from, to }
+    }
+
+    /// The segment moved to the nearest mesh lines; `length` is the unit of length of the mesh in
+    /// the units of the segment.
+    pub fn on_mesh(&self, mesh: &Mesh, length: f64) -> Segment {
+        let (across, along) = mesh.axes(self.normal);
+        let on = |axis: &Axis, v: f64| axis.lines()[axis.nearest_line(v / length)];
+        Segment {
+            normal: self.normal,
+            at: on(across, self.at),
+            from: on(along, self.from),
+            to: on(along, self.to),
+        }
+    }
+
+    /// Mesh nodes on the segment, in ascending order; the segment must lie on mesh lines.
+    pub fn nodes<'a>(&self, mesh: &'a Mesh) -> impl Iterator<Item = usize> + use<'a> {
+        let (across, along) = mesh.axes(self.normal);
+        let normal = self.normal;
+        // The segment may lie or end on the line where a periodic axis is joined.
+        let wrap = |axis: &Axis, n: usize| if axis.periodic() { n % axis.nodes() } else { n };
+        let line = wrap(across, 2 * across.nearest_line(self.at));
+        let [from, to] = [self.from, self.to].map(|v| 2 * along.nearest_line(v));
+        (from..=to).map(move |k| {
+            let k = wrap(along, k);
+            if normal == 0 { mesh.node(line, k) } else { mesh.node(k, line) }
+        })
+    }
+}
