@@ -116,7 +116,7 @@ fn stresses_are_those_of_the_source() {
     let (coupling, couple, eta_s) = (300.0, 12.0, 50.0);
     for angle in ANGLES {
         let n = unit(angle);
-        let d = 0.5 * (l + l.transpose());
+        let d: Matrix2<f64> = 0.5 * (l + l.transpose());
         let delta = |i: usize, j: usize| if i == j { 1.0_f64 } else { 0.0 };
         let a = |i: usize, j: usize, k: usize, m: usize| {
             0.5 * (n[i] * n[k] * delta(m, j)
