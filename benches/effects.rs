@@ -4,7 +4,7 @@
 //! within noise. The ratio of a scene to itself shows the noise.
 
 use grainscope::cost::effects::{Pair, pair, without};
-use grainscope::cost::measure::timed;
+use grainscope::session::timed;
 use grainscope::plan::{EffectKind, Plan};
 use grainscope::record::info;
 use grainscope::record::logger::{Backpressure, Logger};

@@ -48,6 +48,7 @@ pub mod motion;
 pub mod plan;
 pub mod record;
 pub mod scene;
+pub mod session;
 pub mod sim;
 pub mod simd;
 pub mod solve;

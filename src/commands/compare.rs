@@ -3,9 +3,8 @@
 use super::{Failure, print};
 use crate::compare::{self, CompareError, Comparison, Member, Tolerance};
 use crate::record::rerun_log::{Served, Sink};
+use crate::session::{wait_for_interrupt, watch_interrupts};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Compare runs: values, curves, fields and scenes, and one recording side by side.
 ///
@@ -128,9 +127,5 @@ fn show(served: &Served, open: bool) {
     if open && let Err(e) = webbrowser::open(url) {
         eprintln!("warning: no browser could be opened ({e}); open the link yourself");
     }
-    let interrupted = Arc::new(AtomicBool::new(false));
-    super::run::watch_interrupts(&interrupted);
-    while !interrupted.load(Ordering::SeqCst) {
-        std::thread::sleep(std::time::Duration::from_millis(100));
-    }
+    wait_for_interrupt(&watch_interrupts(super::code::INTERRUPTED));
 }

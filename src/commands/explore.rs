@@ -2,9 +2,8 @@
 
 use super::Failure;
 use crate::explorer::{Explorer, ExplorerError, Settings};
+use crate::session::watch_interrupts;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Change parameters while the fluid flows, in a page of your browser.
 ///
@@ -44,17 +43,8 @@ impl From<ExplorerError> for Failure {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (scene, from_file) = super::find(&args.scene)?;
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = interrupted.clone();
-    let watching = ctrlc::set_handler(move || {
-        // The first interrupt waits for the end of the step, the second one does not.
-        if flag.swap(true, Ordering::SeqCst) {
-            std::process::exit(0);
-        }
-    });
-    if let Err(e) = watching {
-        eprintln!("warning: interrupts end the program at once: {e}");
-    }
+    // The first interrupt waits for the end of the step, a second one does not.
+    let interrupted = watch_interrupts(0);
     let explorer = Explorer::open(Settings {
         scene,
         from_file,

@@ -1,6 +1,6 @@
 //! This module implements `grainscope figure`: the figures of the source paper, one command each.
 
-use super::{Failure, compare as comparison, print, run};
+use super::{Failure, compare as comparison, print};
 use crate::compare;
 use crate::frame::Picture;
 use crate::plan::Plan;
@@ -12,9 +12,10 @@ use crate::record::{folder, info};
 use crate::scene::presets;
 use crate::sim::Run;
 use crate::sweep;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use crate::session::{Interrupted, Options, Session, SessionError, progress_bar, watch_interrupts};
+use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -182,15 +183,8 @@ fn cases(figure: &Figure, quick: bool) -> Result<Vec<(String, String, Vec<String
 /// Makes all runs, [`AT_ONCE`] in parallel. Returns the frames of each run at the times of the
 /// figure.
 fn run_all(figure: &Figure, jobs: &[Job]) -> Result<Vec<Vec<Picture>>, Failure> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    run::watch_interrupts(&interrupted);
-    let target = ProgressDrawTarget::stderr_with_hz(8);
-    let bar = ProgressBar::with_draw_target(Some((PARTS * jobs.len() as f64) as u64), target);
-    if let Ok(style) =
-        ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed} of about {duration}")
-    {
-        bar.set_style(style);
-    }
+    let interrupted = watch_interrupts(super::code::INTERRUPTED);
+    let bar = progress_bar((PARTS * jobs.len() as f64) as u64, false);
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<Option<Vec<Picture>>>> = Mutex::new(jobs.iter().map(|_| None).collect());
     let fault: Mutex<Option<Failure>> = Mutex::new(None);
@@ -234,14 +228,16 @@ fn take<'a>(next: &AtomicUsize, jobs: &'a [Job]) -> Option<(usize, &'a Job)> {
 fn make(
     figure: &Figure,
     job: &Job,
-    interrupted: &Arc<AtomicBool>,
+    interrupted: &Interrupted,
     bar: &ProgressBar,
 ) -> Result<Vec<Picture>, Failure> {
     let end = job.plan.clock.end * job.plan.units.time;
     let mut pictures = vec![];
     let mut counted = 0;
-    let summary =
-        run::into_folder(&job.plan, job.folder.clone(), true, interrupted, |run: &dyn Run| {
+    let options = Options { quiet: true, ..Options::default() };
+    let folder = || Ok::<_, SessionError>(job.folder.clone());
+    let summary = Session::start(&options, &job.plan, interrupted.clone(), folder)?.go_silently(
+        |run: &dyn Run| {
             let time = run.row().time;
             let due = figure.times.get(pictures.len());
             if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
@@ -250,7 +246,8 @@ fn make(
             let part = (PARTS * time / end) as u64;
             bar.inc(part.saturating_sub(counted));
             counted = counted.max(part);
-        })?;
+        },
+    )?;
     let outflow = summary.gauges.values().next();
     let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} m2", g.volume));
     let took = duration(summary.seconds.get("total").copied().unwrap_or_default());

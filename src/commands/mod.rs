@@ -15,7 +15,6 @@ mod purchase;
 mod repair;
 mod resume;
 mod run;
-mod safety;
 mod stress;
 mod sweep;
 mod verify;
@@ -25,6 +24,7 @@ use crate::record::folder::FolderError;
 use crate::record::plots::PlotError;
 use crate::record::rerun_log::RecordError;
 use crate::scene::{self, Scene, SceneError, SceneSource};
+use crate::session::{SessionError, tell};
 use crate::sim::SimError;
 use crate::simd::{self, Simd};
 use clap::{CommandFactory, Parser, Subcommand};
@@ -170,6 +170,15 @@ impl From<SimError> for Failure {
         Failure::Sim(e)
     }
 }
+impl From<SessionError> for Failure {
+    fn from(e: SessionError) -> Self {
+        match e {
+            SessionError::Sim(e) => Failure::Sim(e),
+            SessionError::Environment(text) => Failure::Environment(text),
+            SessionError::Interrupted => Failure::Interrupted,
+        }
+    }
+}
 impl From<RecordError> for Failure {
     fn from(e: RecordError) -> Self {
         Failure::Environment(e.to_string())
@@ -187,6 +196,16 @@ impl From<FolderError> for Failure {
 }
 
 impl Failure {
+    /// The failure in one line; `None` for an interrupt and for failed checks.
+    fn describe(&self) -> Option<String> {
+        match self {
+            Failure::Sim(e) => Some(format!("{e}; {}", e.remedy())),
+            Failure::Environment(text) | Failure::Usage(text) => Some(text.clone()),
+            Failure::Scene(e) => Some(e.one_line()),
+            Failure::Interrupted | Failure::Differs(_) => None,
+        }
+    }
+
     fn code(&self) -> u8 {
         match self {
             Failure::Scene(_) => code::SCENE,
@@ -299,12 +318,6 @@ fn print(text: &str) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
-}
-
-/// Writes a line to stderr. A closed pipe is not an error.
-fn tell(text: impl std::fmt::Display) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Finds a scene by preset name or path, and applies the `--set` options.

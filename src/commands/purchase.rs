@@ -6,6 +6,7 @@ use crate::cost::report::{percent, seconds};
 use crate::cost::{Entry, List};
 use crate::record::summary::Purchase;
 use crate::scene::SceneSource;
+use crate::session::Budget;
 use crate::sim::Run;
 use std::time::Instant;
 
@@ -117,15 +118,15 @@ fn pace(source: &SceneSource, list: &List) -> Result<f64, Failure> {
 /// Smallest number of steps of an entry for which the time of a step is compared.
 const LEAST_STEPS: u64 = 5;
 
-impl Bought {
+impl Budget for Bought {
     /// Whether one more step, as long as the last one, would exceed the budget. The time to close
     /// the files is not counted.
-    pub fn is_spent(&self, clock: &Instant, step: f64) -> bool {
+    fn is_spent(&self, clock: &Instant, step: f64) -> bool {
         self.budget.is_some_and(|b| clock.elapsed().as_secs_f64() + step > b)
     }
 
     /// Expected and actual results of a run, for the summary.
-    pub fn receipt(&self, run: &dyn Run, wall: f64) -> Purchase {
+    fn receipt(&self, run: &dyn Run, wall: f64) -> Purchase {
         let gauges = run.plan().gauges.iter().zip(&run.row().gauges).enumerate();
         let bars = gauges.map(|(k, (plan, now))| {
             let line = self.list.gauges.get(k);

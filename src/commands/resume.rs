@@ -1,14 +1,13 @@
 //! This module implements `grainscope resume`: it continues a run that stopped before its end.
 
-use super::run::{self, Session};
-use super::safety::Safety;
-use super::{Failure, print, tell};
+use super::run::{Output, close};
+use super::{Failure, print};
 use crate::record::checkpoint;
+use crate::record::rerun_log::Sink;
 use crate::scene::{self, scene_hash};
-use crate::sim;
+use crate::session::{Options, Safety, Session, SessionError, tell, watch_interrupts};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Continue a run that stopped before its end, for any reason.
 ///
@@ -20,21 +19,17 @@ pub struct Args {
     folder: PathBuf,
     /// Stop after N steps, counted from the start of the run
     #[arg(long, value_name = "N")]
-    pub(super) steps: Option<u64>,
+    steps: Option<u64>,
     /// Serve the viewer from this process on 127.0.0.1, while running and after
     #[arg(long)]
-    pub(super) serve: bool,
+    serve: bool,
     /// Port of the served page; 0 takes any free one
     #[arg(long, value_name = "PORT", default_value_t = 0)]
-    pub(super) port: u16,
+    port: u16,
     #[command(flatten)]
-    pub(super) safety: Safety,
-    /// Print the summary as JSON on stdout
-    #[arg(long)]
-    pub(super) json: bool,
-    /// Print seconds per phase at the end
-    #[arg(long)]
-    pub(super) profile: bool,
+    safety: Safety,
+    #[command(flatten)]
+    output: Output,
 }
 
 /// Runs the command.
@@ -52,16 +47,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (scene, plan) = super::resolve(&source)?;
     super::memory::afford(&plan)?;
     let (plan, hash) = (Arc::new(plan), scene_hash(&scene));
-    let interrupted = Arc::new(AtomicBool::new(false));
-    run::watch_interrupts(&interrupted);
-    let run_args = run::Args::resumed(args);
+    let interrupted = watch_interrupts(super::code::INTERRUPTED);
+    let viewers = args.serve.then_some(Sink::Serve { web_port: args.port, grpc_port: 0 });
+    let options = Options {
+        viewers: viewers.into_iter().collect(),
+        safety: args.safety,
+        steps: args.steps,
+        ..Options::default()
+    };
     let mut faults = Vec::new();
     for (step, path) in checkpoint::list(folder) {
         let opened = checkpoint::read(&path, &hash)
-            .map_err(|e| Failure::Environment(e.to_string()))
+            .map_err(|e| SessionError::Environment(e.to_string()))
             .and_then(|state| {
-                let run = sim::start(plan.clone())?;
-                Session::reopen(&run_args, &plan, run, folder.clone(), &state, interrupted.clone())
+                Session::reopen(&options, &plan, folder.clone(), &state, interrupted.clone())
             });
         match opened {
             Ok(session) => {
@@ -71,10 +70,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 tell(format_args!("continuing after step {step}"));
                 // The old summary describes the earlier part of the run.
                 let _ = std::fs::remove_file(folder.join("summary.json"));
-                return session.go();
+                return close(session.go()?, args.output);
             }
-            Err(Failure::Environment(text)) => faults.push(text),
-            Err(other) => return Err(other),
+            Err(SessionError::Environment(text)) => faults.push(text),
+            Err(other) => return Err(other.into()),
         }
     }
     let reasons: String = faults.iter().map(|f| format!("\n  {f}")).collect();

@@ -1,7 +1,7 @@
 //! This module implements `grainscope sweep`: many runs of one scene, on this machine or through
 //! HyperQueue.
 
-use super::{Failure, compare as comparison, print, run};
+use super::{Failure, compare as comparison, print};
 use crate::compare;
 use crate::record::rerun_log::Sink;
 use crate::record::text::duration;
@@ -11,7 +11,9 @@ use crate::sweep::{
     Case, Engine, Event, HyperQueue, Limits, List, Local, Spec, State, Store, SweepError, Work,
     preset_list, preset_source, read_file, similar,
 };
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use crate::session::{
+    Interrupted, Options, Recording, Session, SessionError, progress_bar, watch_interrupts,
+};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -215,8 +217,7 @@ fn sweep(args: &Args) -> Result<(), Failure> {
     if args.dry_run {
         return print(&plan_text(&open, args));
     }
-    let interrupted = Arc::new(AtomicBool::new(false));
-    run::watch_interrupts(&interrupted);
+    let interrupted = watch_interrupts(super::code::INTERRUPTED);
     if !open.is_empty() {
         let engine = engine(args)?;
         drive(engine.as_ref(), &store, open, &interrupted)?;
@@ -265,12 +266,7 @@ fn drive(
     cases: Vec<&Case>,
     interrupted: &AtomicBool,
 ) -> Result<(), Failure> {
-    let target = ProgressDrawTarget::stderr_with_hz(8);
-    let bar = ProgressBar::with_draw_target(Some(PARTS as u64), target);
-    let template = "{bar:30} {percent:>3} %  {msg}  {elapsed} of about {duration}";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
+    let bar = progress_bar(PARTS as u64, true);
     let count = cases.len();
     let (mut done, mut failed) = (0, 0);
     let mut watch = |event: Event| match event {
@@ -328,8 +324,7 @@ fn verdict(store: &Store, list: &List) -> Result<(), Failure> {
 fn one(store: &Store, name: &str, stop_with_input: bool) -> Result<(), Failure> {
     let (list, source) = store.read()?;
     let case = list.case(name)?;
-    let interrupted = Arc::new(AtomicBool::new(false));
-    run::watch_interrupts(&interrupted);
+    let interrupted = watch_interrupts(super::code::INTERRUPTED);
     if stop_with_input {
         watch_input(&interrupted)?;
     }
@@ -344,7 +339,7 @@ fn one(store: &Store, name: &str, stop_with_input: bool) -> Result<(), Failure> 
             Err(Failure::Interrupted)
         }
         Err(failure) => {
-            let cause = run::describe(&failure).unwrap_or_else(|| "it failed".into());
+            let cause = failure.describe().unwrap_or_else(|| "it failed".into());
             attempt.fail(&cause)?;
             Err(failure)
         }
@@ -357,15 +352,18 @@ fn solve(
     source: &SceneSource,
     folder: &Path,
     recorded: bool,
-    interrupted: &Arc<AtomicBool>,
+    interrupted: &Interrupted,
 ) -> Result<(), Failure> {
     let plan = Arc::new(case.plan(source)?);
-    run::into_folder(&plan, folder.to_owned(), recorded, interrupted, |_| ())?;
+    let recording = if recorded { Recording::Folder } else { Recording::None };
+    let options = Options { quiet: true, recording, ..Options::default() };
+    let folder = || Ok::<_, SessionError>(folder.to_owned());
+    Session::start(&options, &plan, interrupted.clone(), folder)?.go_silently(|_| ())?;
     Ok(())
 }
 
 /// Treats the end of the standard input as an interrupt, so that no case outlives its sweep.
-fn watch_input(interrupted: &Arc<AtomicBool>) -> Result<(), Failure> {
+fn watch_input(interrupted: &Interrupted) -> Result<(), Failure> {
     let flag = interrupted.clone();
     let watch = move || {
         // No data arrive; the copy returns at the end of the input or on a read error.

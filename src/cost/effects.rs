@@ -4,7 +4,8 @@
 //! the share is `1 - (step without)/(step with)`, medians of CPU time. An effect that drives the
 //! flow cannot be removed; its share is that of its own phase of the step.
 
-use super::measure::{median, timed};
+use super::measure::median;
+use crate::session::timed;
 use crate::plan::{EffectKind, EffectList, Plan, StepTime, resolve};
 use crate::scene::Scene;
 use crate::sim::phases::Phases;

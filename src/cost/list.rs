@@ -278,7 +278,7 @@ impl Machine {
             processor: model.to_string(),
             processors: std::thread::available_parallelism().map_or(1, usize::from),
             pinned: None,
-            cpu_clock: super::measure::thread_seconds().is_some(),
+            cpu_clock: crate::session::thread_seconds().is_some(),
         }
     }
 }

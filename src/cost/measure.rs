@@ -2,11 +2,12 @@
 
 use crate::plan::Plan;
 use crate::scene::{Interest, Interesting, Moment, Norm, Quantity, Scene, SceneError, Scope};
+use crate::session::{Took, march, timed};
 use crate::sim::phases::Phases;
 use crate::sim::row::Row;
 use crate::sim::{self, Run, SimError};
-use crate::threads;
 use std::sync::Arc;
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Number of points along a side at which fields are compared. It is prime, so that hardly any
@@ -172,46 +173,6 @@ pub struct Sample {
     pub particles: usize,
 }
 
-/// CPU time and wall-clock time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Took {
-    /// CPU time, s.
-    pub cpu: f64,
-    /// Wall-clock time, s.
-    pub wall: f64,
-}
-
-impl Took {
-    fn add(&mut self, o: Took) {
-        self.cpu += o.cpu;
-        self.wall += o.wall;
-    }
-}
-
-/// CPU time of this thread, s; it does not depend on other programs. `None` if the system does not
-/// report it.
-pub fn thread_seconds() -> Option<f64> {
-    // The kernel updates the value when a thread yields, otherwise at its tick of some
-    // milliseconds.
-    std::thread::yield_now();
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let ns: f64 = text.split_whitespace().next()?.parse().ok()?;
-    (ns > 0.0).then_some(ns * 1e-9)
-}
-
-/// Runs `work` on this thread alone and measures its time. If the system reports no CPU time, the
-/// wall-clock time is used for both.
-pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Took) {
-    let (wall, cpu) = (Instant::now(), thread_seconds());
-    let result = threads::alone(work);
-    let wall = wall.elapsed().as_secs_f64();
-    let cpu = match (cpu, thread_seconds()) {
-        (Some(before), Some(after)) => after - before,
-        _ => wall,
-    };
-    (result, Took { cpu, wall })
-}
-
 /// Runs a plan until its target is known. `watch` is called at the start and after each step with
 /// the time taken so far, which excludes the time of `watch`.
 pub fn run(
@@ -224,16 +185,17 @@ pub fn run(
     let mut phases = run.row().seconds;
     let mut peak = target.scalar(&plan, run.row());
     watch(run.as_ref(), took);
-    while target.at != Moment::Start && !run.is_finished() {
-        let (outcome, step) = timed(|| run.step());
-        outcome?;
-        took.add(step);
-        phases.add(&run.row().seconds);
-        let now = target.scalar(&plan, run.row());
-        if now.abs() > peak.abs() {
-            peak = now;
-        }
-        watch(run.as_ref(), took);
+    if target.at != Moment::Start {
+        march(run.as_mut(), |run, step| {
+            took.add(step);
+            phases.add(&run.row().seconds);
+            let now = target.scalar(&plan, run.row());
+            if now.abs() > peak.abs() {
+                peak = now;
+            }
+            watch(run, took);
+            ControlFlow::Continue(())
+        })?;
     }
     let value = if target.at == Moment::Peak { vec![peak] } else { target.read(run.as_ref()) };
     let row = run.row();
@@ -292,15 +254,16 @@ impl Pilot {
         let (run, start) = timed(|| sim::start(plan.clone()));
         let mut run = run?;
         let end = plan.clock.end * plan.units.time;
-        let (mut cpu, mut count) = (vec![], 0);
-        while !run.is_finished()
-            && (count < 3 || count < PILOT_STEPS && clock.elapsed().as_secs_f64() < patience)
-        {
-            let (outcome, took) = timed(|| run.step());
-            outcome?;
-            cpu.push(took.cpu);
-            count += 1;
+        let mut cpu = vec![];
+        if !run.is_finished() {
+            march(run.as_mut(), |_, took| {
+                cpu.push(took.cpu);
+                let patient = clock.elapsed().as_secs_f64() < patience;
+                let go_on = cpu.len() < 3 || cpu.len() < PILOT_STEPS as usize && patient;
+                if go_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            })?;
         }
+        let count = cpu.len() as u32;
         let row = run.row();
         let left = if row.dt > 0.0 { (end - row.time) / row.dt } else { 0.0 };
         // The first step solves twice; the median ignores it.

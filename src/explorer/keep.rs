@@ -23,6 +23,9 @@ pub enum KeepError {
     /// The folder cannot be created.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// The summary cannot be written.
+    #[error("{0}")]
+    Summary(String),
     /// The recording cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -61,9 +64,9 @@ pub fn keep(
         let path = at(name);
         std::fs::write(&path, text).map_err(|source| KeepError::Write { path, source })
     };
-    write("scene.toml", to_toml(&live.plan.scene))?;
+    write("scene.toml", to_toml(&live.drive.plan.scene))?;
     let table = at("series.csv");
-    SeriesWriter::create(&table, &live.plan)
+    SeriesWriter::create(&table, &live.drive.plan)
         .and_then(|mut series| live.rows.iter().try_for_each(|row| series.write(row)))
         .map_err(|source| KeepError::Write { path: table, source })?;
     let recording = at("recording.rrd");
@@ -71,27 +74,26 @@ pub fn keep(
     let mut info = live.info.clone();
     info.name = folder_name.clone().unwrap_or(info.name);
     // The schedule has changed since the start of the run.
-    info.scene_toml = to_toml(&live.plan.scene);
+    info.scene_toml = to_toml(&live.drive.plan.scene);
     let mut log = RerunLog::open(&info, &[Sink::Save(recording.clone())])?;
     live.film.frames().iter().try_for_each(|frame| log.frame(frame))?;
     log.finish()?;
-    let mut tally = Tally { wall: live.seconds(), ..live.tally.clone() };
-    tally.warnings.extend(live.run.warnings().iter().map(ToString::to_string));
+    let mut tally = Tally { wall: live.seconds(), ..live.drive.tally.clone() };
+    tally.warnings.extend(live.drive.run.warnings().iter().map(ToString::to_string));
     let ending = match mode {
         Mode::Finished => Ending::Finished,
         Mode::Failed => Ending::Failed,
         _ => Ending::Interrupted,
     };
     let summary = Summary::new(
-        live.run.as_ref(),
+        live.drive.run.as_ref(),
         &tally,
         ending,
         folder.display().to_string(),
         Some(recording.display().to_string()),
     );
-    let json = serde_json::to_string_pretty(&summary).unwrap_or_default();
-    write("summary.json", format!("{json}\n"))?;
-    plots_of_run(&folder, &live.plan, &live.rows)?;
+    summary.write(&folder).map_err(KeepError::Summary)?;
+    plots_of_run(&folder, &live.drive.plan, &live.rows)?;
     let files = folder::FILES.iter().filter_map(|name| {
         let size = std::fs::metadata(at(name)).ok()?.len();
         Some((name.to_string(), size))

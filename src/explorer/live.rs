@@ -9,10 +9,11 @@ use crate::plan::{Plan, When};
 use crate::record::info;
 use crate::record::summary::Tally;
 use crate::scene::SceneError;
-use crate::sim::guard::{Guard, Policy};
+use crate::session::{self, Drive};
+use crate::sim::guard::Policy;
 use crate::sim::phases::Phases;
 use crate::sim::row::Row;
-use crate::sim::{self, Run, SimError, picture};
+use crate::sim::{self, SimError};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -40,24 +41,18 @@ pub struct Live {
     pub draft: Draft,
     /// Plan of the draft, which a new run would have.
     pub values: Plan,
-    /// The run.
-    pub run: Box<dyn Run>,
-    guard: Guard,
+    /// The guarded run.
+    pub drive: Drive,
     /// Messages of the guard about the last step.
     faults: Vec<String>,
-    /// Plan of the run, with all changes so far.
-    pub plan: Arc<Plan>,
     /// Constant part of its recording.
     pub info: RunInfo,
     /// Its frames.
     pub film: Film,
     /// Its diagnostics, one row per step.
     pub rows: Vec<Row>,
-    /// Totals for the summary.
-    pub tally: Tally,
     /// Changes of the scene during the run.
     pub changes: Vec<Change>,
-    frames: usize,
     /// Computing time of all steps so far.
     computing: Duration,
     drawn: Option<Instant>,
@@ -72,11 +67,9 @@ impl Live {
         let plan = Arc::new(plan);
         let clock = Instant::now();
         let run = sim::start(plan.clone())?;
-        let mut warnings: Vec<String> = plan.warnings.iter().map(ToString::to_string).collect();
-        let every = picture::thinning(&plan, picture::drawn(&plan, run.particles()).len());
-        if every > 1 {
-            warnings.push(crate::plan::Warning::ParticlesThinned { every }.to_string());
-        }
+        let mut warnings = session::warnings(&plan);
+        warnings.extend(session::thinned(&plan, run.as_ref()));
+        let tally = Tally::new(run.row(), warnings);
         board.begin(id, board::columns(&plan));
         let mut info = info::run_info(&plan, &plan.scene.name);
         info.recording_id = format!("{}-{id}", info.recording_id);
@@ -87,35 +80,31 @@ impl Live {
             info,
             film: Film::default(),
             rows: vec![],
-            tally: Tally::new(run.row(), warnings),
             changes: vec![],
-            frames: 0,
             computing: clock.elapsed(),
             drawn: None,
             drawing: Duration::ZERO,
             ends: VecDeque::new(),
-            guard: Guard::new(Policy::default(), run.as_ref()),
             faults: vec![],
-            run,
-            plan,
+            drive: Drive::new(plan, run, Policy::default(), tally),
         })
     }
 
     /// Takes a step. Its events are in the events of the run.
     pub fn step(&mut self) -> Result<(), SimError> {
         let clock = Instant::now();
-        self.faults = self.guard.step(self.run.as_mut())?;
+        self.faults = self.drive.step()?;
         self.computing += clock.elapsed();
         if self.ends.len() > MEAN_OVER {
             self.ends.pop_front();
         }
         self.ends.push_back(Instant::now());
-        let (step, time) = (self.run.row().step, self.run.row().time);
+        let (step, time) = (self.drive.run.row().step, self.drive.run.row().time);
         for change in self.changes.iter_mut().filter(|c| c.step == step) {
             change.time = Some(time);
         }
         // Changes of the scene's own schedule are listed when they happen.
-        for event in self.run.events() {
+        for event in self.drive.run.events() {
             let label = event.split_once(": ").map_or(event.as_str(), |e| e.1).to_string();
             if !self.changes.iter().any(|c| c.step == step) {
                 self.changes.push(Change { step, time: Some(time), label });
@@ -126,20 +115,16 @@ impl Live {
 
     /// Records the present instant. `draw` requests a picture, however recent the last one is.
     pub fn observe(&mut self, draw: bool, board: &Board) -> Arc<Frame> {
-        let row = self.run.row().clone();
-        self.tally.add(&row);
-        let mut notes = self.run.events().to_vec();
+        let row = self.drive.run.row().clone();
+        self.drive.tally.add(&row);
+        let mut notes = self.drive.run.events().to_vec();
         notes.append(&mut self.faults);
-        if row.step == 0 {
-            notes.extend(self.tally.warnings.iter().cloned());
-        }
-        let wanted = self.plan.frame_is_due(row.time, &mut self.frames);
-        let draw = draw || wanted || self.run.is_finished() || self.picture_is_due();
+        let wanted = self.drive.frame_is_due();
+        let draw = draw || wanted || self.drive.run.is_finished() || self.picture_is_due();
         let picture = draw.then(|| self.draw());
-        let wall = self.computing.as_secs_f64();
-        let frame = Arc::new(info::frame(&self.plan, &row, wall, picture, notes));
+        let frame = Arc::new(self.drive.frame(self.seconds(), picture, notes));
         self.film.push(frame.clone(), wanted);
-        board.add(self.id, board::point(&self.plan, &row));
+        board.add(self.id, board::point(&self.drive.plan, &row));
         self.rows.push(row);
         frame
     }
@@ -149,19 +134,16 @@ impl Live {
         if self.film.ends_in_a_picture() {
             return None;
         }
-        let picture = Some(self.draw());
-        let wall = self.computing.as_secs_f64();
-        let row = self.run.row();
-        let (step, time_s) = (row.step, row.time);
-        let frame = Frame { step, time_s, wall_s: wall, picture, ..Default::default() };
-        let frame = Arc::new(frame);
+        let picture = self.draw();
+        let run = self.drive.run.as_ref();
+        let frame = Arc::new(session::picture_alone(run, self.seconds(), picture));
         self.film.push(frame.clone(), false);
         Some(frame)
     }
 
     fn draw(&mut self) -> crate::frame::Picture {
         let clock = Instant::now();
-        let picture = self.run.picture();
+        let picture = self.drive.run.picture();
         self.drawing = clock.elapsed();
         self.drawn = Some(Instant::now());
         picture
@@ -179,9 +161,9 @@ impl Live {
         if let Some(what) = self.values.beyond_matter(&values) {
             return Ok((draft, values, Turn::Restart(format!("it changes {what}"))));
         }
-        let step = self.run.row().step + 1;
+        let step = self.drive.run.row().step + 1;
         let set = [(key.trim().to_string(), quantity(value))].into_iter().collect();
-        let turn = match self.plan.with_change(self.run.changes_applied(), step, &set) {
+        let turn = match self.drive.plan.with_change(self.drive.run.changes_applied(), step, &set) {
             Ok(plan) => Turn::Live(Box::new(plan), step),
             Err(e) => Turn::Restart(e.message().to_string()),
         };
@@ -192,10 +174,10 @@ impl Live {
     pub fn go_on(&mut self, draft: Draft, values: Plan, plan: Plan, step: u64) {
         self.draft = draft;
         self.values = values;
-        self.plan = Arc::new(plan);
-        self.run.replan(self.plan.clone());
+        self.drive.plan = Arc::new(plan);
+        self.drive.run.replan(self.drive.plan.clone());
         self.changes.retain(|c| c.step < step);
-        let entry = self.plan.changes.iter().find(|c| c.when == When::Step(step));
+        let entry = self.drive.plan.changes.iter().find(|c| c.when == When::Step(step));
         let label = entry.map_or(String::new(), |c| c.label.clone());
         self.changes.push(Change { step, time: None, label });
     }

@@ -189,7 +189,7 @@ impl Session {
                 "pick a scene, or correct the one that has errors",
             );
         };
-        let step = live.run.row().step;
+        let step = live.drive.run.row().step;
         match command {
             Command::Run {} if self.mode.goes_on() => {
                 live.paused();
@@ -212,7 +212,7 @@ impl Session {
                 self.stand(self.mode);
                 match (&self.live, self.mode) {
                     (Some(live), Mode::Paused | Mode::Finished) => {
-                        Answer::yes(format!("step {}", live.run.row().step))
+                        Answer::yes(format!("step {}", live.drive.run.row().step))
                     }
                     _ => Answer::no("the step could not be taken", "see the error above"),
                 }
@@ -236,7 +236,7 @@ impl Session {
         match live.step() {
             Ok(()) => {
                 let frame = live.observe(self.mode != Mode::Running, &self.board);
-                if live.run.is_finished() {
+                if live.drive.run.is_finished() {
                     self.mode = Mode::Finished;
                     self.tell(true, "the end of the scene is reached");
                 }
@@ -301,7 +301,7 @@ impl Session {
         if let Some(live) = &self.live
             && live.rows.len() > SETTLED
         {
-            self.measured.insert(knobs::kind(&live.plan), live.usual_step());
+            self.measured.insert(knobs::kind(&live.drive.plan), live.usual_step());
         }
     }
 
@@ -370,7 +370,7 @@ impl Session {
         self.knobs.clear();
         self.switches.clear();
         self.dial.clear();
-        self.effects = live.plan.describe().effects;
+        self.effects = live.drive.plan.describe().effects;
         self.set_stage();
         self.publish();
         self.examine();
@@ -460,7 +460,7 @@ impl Session {
         live.look();
         let mut info = live.info.clone();
         info.name = name.clone();
-        let row = live.run.row();
+        let row = live.drive.run.row();
         let values = live.draft.summary();
         let state = PinState {
             name: name.clone(),
@@ -512,11 +512,11 @@ impl Session {
         let (title, description) = self
             .live
             .as_ref()
-            .map_or(("", ""), |l| (l.plan.scene.name.as_str(), l.plan.scene.description.as_str()));
+            .map_or(("", ""), |l| (l.drive.plan.scene.name.as_str(), l.drive.plan.scene.description.as_str()));
         let mut warnings = vec![];
         if let Some(live) = &self.live {
             warnings.extend(live.values.warnings.iter().map(ToString::to_string));
-            warnings.extend(live.run.warnings().iter().map(ToString::to_string));
+            warnings.extend(live.drive.run.warnings().iter().map(ToString::to_string));
         }
         let state = State {
             mode: self.mode,
@@ -574,7 +574,7 @@ impl Session {
         let cells = live.map(|l| l.values.scene.accuracy.cells);
         let guess = || {
             let live = live.filter(|l| l.rows.len() > 1)?;
-            let ratio = s.unknowns as f64 / knobs::unknowns(&live.plan) as f64;
+            let ratio = s.unknowns as f64 / knobs::unknowns(&live.drive.plan) as f64;
             Some(live.usual_step() * ratio.powf(STEP_GROWTH))
         };
         DialState {
@@ -592,8 +592,8 @@ fn milliseconds(seconds: f64) -> String {
 }
 
 fn run_state(live: &Live) -> RunState {
-    let row = live.run.row();
-    let plan = &live.plan;
+    let row = live.drive.run.row();
+    let plan = &live.drive.plan;
     let sum = live.phases();
     let total = sum.total().max(f64::MIN_POSITIVE);
     let mut readings: Vec<Reading> = vec![];
@@ -629,7 +629,7 @@ fn run_state(live: &Live) -> RunState {
 
 /// Diagnostics with the bounds of the stress tests.
 fn lights(live: &Live) -> Vec<Light> {
-    let row = live.run.row();
+    let row = live.drive.run.row();
     let drift = row.drift.iter().map(|d| d.abs()).fold(0.0, f64::max);
     let light = |name, value: f64, bound: f64, meaning| Light {
         name,
@@ -640,7 +640,7 @@ fn lights(live: &Live) -> Vec<Light> {
         meaning,
     };
     // The divergence error grows with the tolerance of the solver.
-    let divergence = CRITERIA.divergence.max(10.0 * live.plan.method.tolerance);
+    let divergence = CRITERIA.divergence.max(10.0 * live.drive.plan.method.tolerance);
     vec![
         light(
             "power balance",

@@ -7,6 +7,7 @@ use crate::sim::phases::Phases;
 use crate::sim::row::{GaugeRow, Row};
 use indexmap::IndexMap;
 use serde::Serialize;
+use std::path::Path;
 
 /// Version of the format of `summary.json`.
 pub const SCHEMA: u32 = 1;
@@ -214,6 +215,18 @@ impl Tally {
 }
 
 impl Summary {
+    /// Writes `summary.json` into a folder, and returns its text.
+    ///
+    /// # Errors
+    /// A sentence with the path and the cause.
+    pub fn write(&self, folder: &Path) -> Result<String, String> {
+        let json = serde_json::to_string_pretty(self).map_err(|e| e.to_string())?;
+        let path = folder.join("summary.json");
+        std::fs::write(&path, format!("{json}\n"))
+            .map_err(|e| format!("cannot write {}: {e}", path.display()))?;
+        Ok(json)
+    }
+
     /// The summary of a run in its present state.
     pub fn new(
         run: &dyn Run,

@@ -2,10 +2,12 @@
 
 use super::{CRITERIA, Outcome, Trial, Verdict, judge};
 use crate::cases::{CaseError, plan_of};
+use crate::session::march;
 use crate::sim::{self, Run};
 use crate::space::mesh::Axis;
 use crate::threads;
 use crate::verify::{Bound, Check};
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -164,10 +166,12 @@ impl Trial {
         let first = First::new(run.as_ref());
         let mut worst = Worst::default();
         worst.observe(run.as_ref(), &first);
-        while *steps < self.steps && !run.is_finished() {
-            run.step()?;
-            *steps += 1;
-            worst.observe(run.as_ref(), &first);
+        if self.steps > 0 {
+            march(run.as_mut(), |run, _| {
+                *steps += 1;
+                worst.observe(run, &first);
+                if *steps < self.steps { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            })?;
         }
         let mut checks = worst.checks(self.drifts);
         if let Some(expect) = &self.expect {

@@ -135,7 +135,7 @@ fn invalid_values_are_refused_with_the_right_syntax() {
         (&["--vary", "alpha=0,200"], 3, &["case alpha=200", "outside its range: 0 to 100"]),
         (&["--vary", "alpha"], 2, &["there is no `=`", "name=a,b,c"]),
         (&["--vary", "alpha=0..1", "--sample", "grid:3"], 2, &["sobol:N"]),
-        (&["--quick"], 2, &["--quick: silo is a scene"]),
+        (&["--quick"], 2, &["--quick: the scene silo has no quick settings"]),
     ] {
         here.grainscope(&small(more)).exits(code).complains(parts);
     }

@@ -1,7 +1,9 @@
-//! This module defines the options of a run for checkpoints and for steps that fail.
+//! Options of a session: where its output goes, how it is guarded, and when it stops.
 
+use crate::record::rerun_log::Sink;
 use crate::sim::guard::Policy;
 use crate::sim::state::{State, StateError};
+use std::path::PathBuf;
 
 /// Options for checkpoints and for steps that fail.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
@@ -65,4 +67,31 @@ impl Safety {
         };
         Ok(Safety { checkpoint_every: (every > 0).then_some(every), on_fault })
     }
+}
+
+/// Where the recording of a run goes besides viewers.
+#[derive(Clone, Debug, Default)]
+pub enum Recording {
+    /// No recording.
+    None,
+    /// `recording.rrd` in the folder of the run.
+    #[default]
+    Folder,
+    /// A file elsewhere.
+    File(PathBuf),
+}
+
+/// How a session runs.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Where the recording goes.
+    pub recording: Recording,
+    /// Viewers that receive the frames.
+    pub viewers: Vec<Sink>,
+    /// Checkpoints and the policy for failed steps.
+    pub safety: Safety,
+    /// Largest number of steps, counted from the start of the run.
+    pub steps: Option<u64>,
+    /// Print no messages: those of several runs at once would mix.
+    pub quiet: bool,
 }

@@ -1,0 +1,51 @@
+//! Interrupts of the user, and messages on the terminal.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Set by an interrupt; a run then ends after its step.
+pub type Interrupted = Arc<AtomicBool>;
+
+/// Handles interrupts: the first sets the flag, a second ends the program with the given exit code.
+pub fn watch_interrupts(exit_code: u8) -> Interrupted {
+    let interrupted = Interrupted::default();
+    let flag = interrupted.clone();
+    let watching = ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::SeqCst) {
+            std::process::exit(i32::from(exit_code));
+        }
+    });
+    if let Err(e) = watching {
+        tell(format_args!("warning: interrupts end the program at once: {e}"));
+    }
+    interrupted
+}
+
+/// Waits for an interrupt.
+pub fn wait_for_interrupt(interrupted: &Interrupted) {
+    while !interrupted.load(Ordering::SeqCst) {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// Writes a line to stderr; a closed stderr is not an error.
+pub fn tell(text: impl std::fmt::Display) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// A progress bar on stderr with this many units, with or without a message.
+pub fn progress_bar(units: u64, message: bool) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(units), ProgressDrawTarget::stderr_with_hz(8));
+    let template = if message {
+        "{bar:30} {percent:>3} %  {msg}  {elapsed} of about {duration}"
+    } else {
+        "{bar:30} {percent:>3} %  {elapsed} of about {duration}"
+    };
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,21 @@
+//! Drives runs: options, guard, output, interrupts, timing and the end, for every command that computes.
+//!
+//! [`Session`] is a run with all its files; [`Drive`] is the guarded run inside, which the explorer
+//! uses too; [`march`] takes steps without a guard, for measurements.
+
+mod drive;
+mod end;
+mod error;
+mod files;
+mod interrupts;
+mod options;
+mod past;
+mod timing;
+
+pub use drive::{Drive, picture_alone, thinned, warnings};
+pub use end::Ended;
+pub use error::SessionError;
+pub use files::{Budget, Session};
+pub use interrupts::{Interrupted, progress_bar, tell, wait_for_interrupt, watch_interrupts};
+pub use options::{OnFault, Options, Recording, Safety};
+pub use timing::{Took, march, thread_seconds, timed};

@@ -1,0 +1,86 @@
+//! The data of a checkpoint besides the state of the simulation.
+
+use super::options::Safety;
+use crate::record::logger::Traffic;
+use crate::record::summary::{Around, Tally};
+use crate::sim::state::{State, StateError, load_phases, save_phases};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The data of a checkpoint besides the state of the simulation.
+pub struct Past {
+    /// Counts for the summary.
+    pub tally: Tally,
+    /// Wall time (s), frames, and time of the logger (s).
+    pub before: (f64, Traffic, f64),
+    /// Path of the recording.
+    pub recording: Option<PathBuf>,
+    /// Warnings so far.
+    pub warnings: Vec<String>,
+    /// Options of the run.
+    pub safety: Safety,
+}
+
+impl Past {
+    /// Writes it beside the state. `folder`: of the run.
+    pub fn save(&self, state: &mut State, folder: &Path) {
+        save_phases("session.phases", &self.tally.phases, state);
+        let (wall, traffic, busy) = self.before;
+        let t = &self.tally;
+        state.put_floats(
+            "session.numbers",
+            [
+                wall,
+                t.largest_power_error,
+                t.largest_divergence,
+                t.first_energy,
+                traffic.waited.as_secs_f64(),
+                busy,
+                t.around.set_up,
+                t.around.guard,
+                t.around.writing,
+            ],
+        );
+        state.put_counts("session.frames", [traffic.frames, traffic.drops, traffic.waits]);
+        self.safety.save(state);
+        if let Some(recording) = &self.recording {
+            // The folder of a run may be moved, so paths inside it are saved as relative paths.
+            let inside = recording.strip_prefix(folder).map(Path::to_path_buf);
+            let path = inside.or_else(|_| std::path::absolute(recording));
+            let path = path.unwrap_or_else(|_| recording.clone());
+            state.put_bytes("session.recording", path.to_string_lossy().bytes());
+        }
+        state.put_bytes("session.warnings", self.warnings.join("\n").bytes());
+        state.put_bytes("session.program", env!("CARGO_PKG_VERSION").bytes());
+    }
+
+    /// Reads what [`Past::save`] wrote.
+    pub fn load(state: &State, folder: &Path) -> Result<Past, StateError> {
+        let [wall, power, divergence, energy, waited, busy, set_up, guard, writing] =
+            state.numbers("session.numbers")?;
+        let [frames, drops, waits] = state.tally("session.frames")?;
+        let waited = Duration::try_from_secs_f64(waited).unwrap_or_default();
+        let traffic = Traffic { frames, drops, waits, waited };
+        let recording = match state.try_bytes("session.recording") {
+            Some(_) => Some(folder.join(state.text("session.recording")?)),
+            None => None,
+        };
+        Ok(Past {
+            tally: Tally {
+                phases: load_phases("session.phases", state)?,
+                wall,
+                largest_power_error: power,
+                largest_divergence: divergence,
+                first_energy: energy,
+                traffic,
+                logger_seconds: busy,
+                around: Around { set_up, guard, writing },
+                warnings: vec![],
+            },
+            before: (wall, traffic, busy),
+            recording,
+            warnings: state.text("session.warnings")?.lines().map(String::from).collect(),
+            safety: Safety::load(state)?,
+        })
+    }
+}
