@@ -4,11 +4,11 @@
 //! within noise. The ratio of a scene to itself shows the noise.
 
 use grainscope::cost::effects::{Pair, pair, without};
-use grainscope::session::timed;
 use grainscope::plan::{EffectKind, Plan};
 use grainscope::record::info;
 use grainscope::record::logger::{Backpressure, Logger};
 use grainscope::record::rerun_log::{RerunLog, Sink};
+use grainscope::session::timed;
 use grainscope::{plan, scene, sim};
 use std::error::Error;
 use std::sync::Arc;

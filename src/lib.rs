@@ -47,6 +47,7 @@ pub mod laws;
 pub mod motion;
 pub mod plan;
 pub mod record;
+pub mod results;
 pub mod scene;
 pub mod session;
 pub mod sim;

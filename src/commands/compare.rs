@@ -1,8 +1,9 @@
 //! This module implements `grainscope compare`: runs side by side, in numbers and in one recording.
 
 use super::{Failure, print};
-use crate::compare::{self, CompareError, Comparison, Member, Tolerance};
+use crate::compare::{self, Comparison, Tolerance};
 use crate::record::rerun_log::{Served, Sink};
+use crate::results::{self, Member, ResultsError};
 use crate::session::{wait_for_interrupt, watch_interrupts};
 use std::path::{Path, PathBuf};
 
@@ -39,11 +40,11 @@ pub struct Args {
     open: bool,
 }
 
-impl From<CompareError> for Failure {
-    fn from(e: CompareError) -> Self {
+impl From<ResultsError> for Failure {
+    fn from(e: ResultsError) -> Self {
         match e {
-            CompareError::Scene(e) => e.into(),
-            CompareError::Usage(text) => Failure::Usage(text),
+            ResultsError::Scene(e) => e.into(),
+            ResultsError::Usage(text) => Failure::Usage(text),
             other => Failure::Environment(other.to_string()),
         }
     }
@@ -51,7 +52,7 @@ impl From<CompareError> for Failure {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let members = compare::open_all(&args.runs)?;
+    let members = results::open_all(&args.runs)?;
     let found = compare::compare(&members, &args.tolerances)?;
     let (comparison, served) = if args.no_output {
         (found.comparison, None)

@@ -10,9 +10,9 @@ use crate::record::sheet::{Row, Sheet, sheet};
 use crate::record::text::duration;
 use crate::record::{folder, info};
 use crate::scene::presets;
+use crate::session::{Interrupted, Options, Session, SessionError, progress_bar, watch_interrupts};
 use crate::sim::Run;
 use crate::sweep;
-use crate::session::{Interrupted, Options, Session, SessionError, progress_bar, watch_interrupts};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -258,7 +258,7 @@ fn make(
 /// Compares all runs with the first one, and writes the recording. Returns the text to print.
 fn side_by_side(jobs: &[Job], path: &Path) -> Result<String, Failure> {
     let folders: Vec<PathBuf> = jobs.iter().map(|job| job.folder.clone()).collect();
-    let mut members = compare::open_all(&folders)?;
+    let mut members = crate::results::open_all(&folders)?;
     for (member, job) in members.iter_mut().zip(jobs) {
         member.rename(&job.name);
     }

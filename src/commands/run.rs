@@ -177,8 +177,7 @@ fn report(ended: &Ended, profile: bool) -> String {
         duration(ended.wall)
     );
     for (name, g) in &s.gauges {
-        out +=
-            &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
+        out += &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
     }
     if let Some(p) = &s.purchase {
         out += &purchase::receipt_text(p);
@@ -192,10 +191,8 @@ fn report(ended: &Ended, profile: bool) -> String {
     );
     if profile {
         for (name, seconds) in &s.seconds {
-            out += &format!(
-                "  {name:<20} {seconds:>9.3} s {:>5.1} %\n",
-                100.0 * seconds / ended.wall
-            );
+            out +=
+                &format!("  {name:<20} {seconds:>9.3} s {:>5.1} %\n", 100.0 * seconds / ended.wall);
         }
     }
     out += &format!("  folder: {}\n", s.folder);

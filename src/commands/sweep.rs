@@ -6,13 +6,13 @@ use crate::compare;
 use crate::record::rerun_log::Sink;
 use crate::record::text::duration;
 use crate::scene::SceneSource;
+use crate::session::{
+    Interrupted, Options, Recording, Session, SessionError, progress_bar, watch_interrupts,
+};
 use crate::sweep::collect::Collection;
 use crate::sweep::{
     Case, Engine, Event, HyperQueue, Limits, List, Local, Spec, State, Store, SweepError, Work,
     preset_list, preset_source, read_file, similar,
-};
-use crate::session::{
-    Interrupted, Options, Recording, Session, SessionError, progress_bar, watch_interrupts,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -464,7 +464,7 @@ fn of_first_seed<'a>(store: &Store, list: &'a List) -> Vec<&'a Case> {
 /// Writes one recording and plots of some cases, compared with the first of them.
 fn beside(store: &Store, cases: &[&Case]) -> Result<PathBuf, Failure> {
     let folders: Vec<PathBuf> = cases.iter().map(|c| store.done(&c.id)).collect();
-    let mut members = compare::open_all(&folders)?;
+    let mut members = crate::results::open_all(&folders)?;
     for (member, case) in members.iter_mut().zip(cases) {
         member.rename(&case.label());
     }

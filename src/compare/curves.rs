@@ -1,6 +1,7 @@
 //! This module computes the distances between the curves of two runs.
 
-use super::{CurveChange, Member};
+use super::CurveChange;
+use crate::results::{Member, later, table};
 
 /// The largest distance of each curve from that of the first run, up to the time `until` (s).
 pub fn changes(members: &[Member], until: f64) -> Vec<CurveChange> {
@@ -8,9 +9,9 @@ pub fn changes(members: &[Member], until: f64) -> Vec<CurveChange> {
     let Some(a) = &first.table else { return vec![] };
     let mut list = vec![];
     for (member, b) in others.iter().filter_map(|m| Some((m, m.table.as_ref()?))) {
-        for (key, column) in a.columns.iter().filter(|(key, _)| super::table::has_curve(key)) {
+        for (key, column) in a.columns.iter().filter(|(key, _)| table::has_curve(key)) {
             let Some(other) = b.columns.get(key) else { continue };
-            let shared = || a.times().iter().zip(column).filter(|(t, _)| !super::later(**t, until));
+            let shared = || a.times().iter().zip(column).filter(|(t, _)| !later(**t, until));
             let scale = shared().map(|(_, v)| v.abs()).fold(0.0, f64::max);
             let mut worst = (0.0, 0.0);
             for (&time, value) in shared() {

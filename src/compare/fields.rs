@@ -1,8 +1,8 @@
 //! This module computes differences of fields. Particles of two runs have no one-to-one
 //! correspondence, but fields can be compared on a common grid.
 
-use super::{Member, later};
 use crate::frame::{GridField, Quantity, Rect};
+use crate::results::{Member, SAME_TIME, later};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -139,7 +139,7 @@ fn on_grid(field: &GridField, domain: Rect, [nx, ny]: [usize; 2]) -> GridField {
 
 /// The field at a time, interpolated between snapshots; `None` outside their time range.
 fn at_time(pictures: &[(f64, GridField)], time: f64) -> Option<GridField> {
-    let room = super::SAME_TIME * time.abs();
+    let room = SAME_TIME * time.abs();
     let after = pictures.partition_point(|(t, _)| *t < time - room);
     let (t1, next) = pictures.get(after)?;
     if (t1 - time).abs() <= room {

@@ -5,25 +5,20 @@
 
 mod curves;
 mod fields;
-mod member;
 mod report;
 mod scenes;
-mod table;
 mod tolerance;
 mod view;
 
-pub use member::{CompareError, Kind, Member, open_all};
 pub use report::{markdown, terminal};
 pub use tolerance::{Amount, Tolerance, Verdict};
 pub use view::{plots, record};
 
+use crate::results::{Kind, Member, ResultsError, later, table};
 use serde::Serialize;
 
 /// Version of the JSON format of a comparison.
 pub const SCHEMA: u32 = 1;
-
-/// Relative difference below which times are equal.
-const SAME_TIME: f64 = 1e-9;
 
 /// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
@@ -73,6 +68,23 @@ pub struct RunHead {
     pub identical: Option<bool>,
 }
 
+impl RunHead {
+    /// Identity of a run; `first` is the reference run.
+    fn new(run: &Member, first: &Member) -> RunHead {
+        let (scene, scene_hash) = run.scene().unzip();
+        RunHead {
+            name: run.name.clone(),
+            path: run.path.display().to_string(),
+            kind: run.kind,
+            scene,
+            scene_hash,
+            state_hash: run.state_hash().map(String::from),
+            end: run.end,
+            identical: run.state_hash().zip(first.state_hash()).map(|(a, b)| a == b),
+        }
+    }
+}
+
 /// One quantity of all runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Value {
@@ -101,7 +113,7 @@ pub struct CurveChange {
 }
 
 /// Compares all runs with the first one. The result includes the field differences for a recording.
-pub fn compare(members: &[Member], tolerances: &[Tolerance]) -> Result<Found, CompareError> {
+pub fn compare(members: &[Member], tolerances: &[Tolerance]) -> Result<Found, ResultsError> {
     let mut notes: Vec<String> = members.iter().flat_map(|m| m.notes.clone()).collect();
     let time = members.iter().map(|m| m.end).fold(f64::INFINITY, f64::min);
     if let Some(longest) = members.iter().find(|m| later(m.end, time)) {
@@ -119,7 +131,7 @@ pub fn compare(members: &[Member], tolerances: &[Tolerance]) -> Result<Found, Co
     let comparison = Comparison {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
-        runs: members.iter().map(|m| m.head(&members[0])).collect(),
+        runs: members.iter().map(|m| RunHead::new(m, &members[0])).collect(),
         time,
         values,
         curves: curves::changes(members, time),
@@ -137,10 +149,6 @@ pub struct Found {
     /// Result of the comparison.
     pub comparison: Comparison,
     differences: Vec<fields::Pair>,
-}
-
-fn later(a: f64, b: f64) -> bool {
-    a > b + SAME_TIME * a.abs()
 }
 
 fn short(value: f64) -> String {

@@ -4,6 +4,7 @@
 use super::{Comparison, short};
 use crate::record::number::trim_zeros;
 use crate::record::text::duration;
+use crate::results::table;
 
 /// Maximum number of rows that the terminal shows of a table.
 const MOST_CHANGES: usize = 40;
@@ -212,7 +213,7 @@ fn percent(share: f64) -> String {
 fn value_row(value: &super::Value) -> Vec<String> {
     let cells = value.values.iter().zip(&value.relative).enumerate().map(|(k, (v, relative))| {
         let Some(v) = v else { return "-".to_owned() };
-        let text = if value.key == super::table::SECONDS { duration(*v) } else { number(*v) };
+        let text = if value.key == table::SECONDS { duration(*v) } else { number(*v) };
         match relative {
             // Relative changes of quantities that should be zero are meaningless.
             _ if k == 0 || value.key.ends_with("_drift") => text,
@@ -223,7 +224,7 @@ fn value_row(value: &super::Value) -> Vec<String> {
             None => text,
         }
     });
-    let unit = if value.key == super::table::SECONDS { "" } else { value.unit };
+    let unit = if value.key == table::SECONDS { "" } else { value.unit };
     [value.key.clone(), unit.to_owned()].into_iter().chain(cells).collect()
 }
 

@@ -1,6 +1,7 @@
 //! This module checks tolerances: the largest allowed difference of a value from the first run.
 
-use super::{CompareError, Member, Value, short};
+use super::{Value, short};
+use crate::results::{Member, ResultsError};
 use crate::scene::closest;
 use serde::Serialize;
 
@@ -79,14 +80,14 @@ pub fn judge(
     tolerances: &[Tolerance],
     members: &[Member],
     values: &[Value],
-) -> Result<Vec<Verdict>, CompareError> {
+) -> Result<Vec<Verdict>, ResultsError> {
     let mut list = vec![];
     for tolerance in tolerances {
         let keys = || values.iter().map(|v| v.key.as_str());
         let Some(value) = values.iter().find(|v| v.key == tolerance.key) else {
             let meant = closest(&tolerance.key, keys());
             let meant = meant.map_or(String::new(), |k| format!("; did you mean {k}?"));
-            return Err(CompareError::Usage(format!(
+            return Err(ResultsError::Usage(format!(
                 "--tolerance {}: there is no such value{meant} These can be compared: {}",
                 tolerance.key,
                 keys().collect::<Vec<_>>().join(", ")

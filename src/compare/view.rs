@@ -1,9 +1,10 @@
 //! This module draws the curves of all runs in common plots, and records the runs side by side.
 
-use super::{Comparison, Found, Kind, Member, fields, later, report, table};
+use super::{Comparison, Found, fields, report};
 use crate::frame::RunInfo;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_plot};
 use crate::record::rerun_log::{Difference, Finished, RecordError, RecordedRun, SideBySide, Sink};
+use crate::results::{Kind, Member, later, table};
 use std::path::{Path, PathBuf};
 
 /// Name of a figure; title, column and axis name of each of its panels.

@@ -5,9 +5,9 @@
 //! flow cannot be removed; its share is that of its own phase of the step.
 
 use super::measure::median;
-use crate::session::timed;
 use crate::plan::{EffectKind, EffectList, Plan, StepTime, resolve};
 use crate::scene::Scene;
+use crate::session::timed;
 use crate::sim::phases::Phases;
 use crate::sim::{self, Run, SimError};
 use std::sync::Arc;

@@ -6,8 +6,8 @@ use crate::session::{Took, march, timed};
 use crate::sim::phases::Phases;
 use crate::sim::row::Row;
 use crate::sim::{self, Run, SimError};
-use std::sync::Arc;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Number of points along a side at which fields are compared. It is prime, so that hardly any

@@ -17,7 +17,7 @@ use crate::frame::Frame;
 use crate::plan::Effect;
 use crate::scene::{SceneError, SceneSource};
 use crate::sim::clock::Limiter;
-use crate::stress::CRITERIA;
+use crate::sim::criteria::CRITERIA;
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use indexmap::IndexMap;
 use std::collections::HashMap;
@@ -509,10 +509,9 @@ impl Session {
 
     fn publish(&mut self) {
         self.published = Some(Instant::now());
-        let (title, description) = self
-            .live
-            .as_ref()
-            .map_or(("", ""), |l| (l.drive.plan.scene.name.as_str(), l.drive.plan.scene.description.as_str()));
+        let (title, description) = self.live.as_ref().map_or(("", ""), |l| {
+            (l.drive.plan.scene.name.as_str(), l.drive.plan.scene.description.as_str())
+        });
         let mut warnings = vec![];
         if let Some(live) = &self.live {
             warnings.extend(live.values.warnings.iter().map(ToString::to_string));

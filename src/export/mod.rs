@@ -5,20 +5,17 @@
 mod tables;
 mod vtu;
 
-use crate::compare::{CompareError, Member};
 use crate::frame::{GridField, ParticleSnapshot};
+use crate::results::{Member, ResultsError, SAME_TIME};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Relative difference below which times belong to the same frame.
-const SAME_TIME: f64 = 1e-9;
 
 /// Error of exporting a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The run cannot be read.
     #[error(transparent)]
-    Run(#[from] CompareError),
+    Run(#[from] ResultsError),
     /// The run has no recording.
     #[error("{}: has no recording to export; run the scene again without --no-recording", .0.display())]
     NoRecording(PathBuf),

@@ -12,6 +12,7 @@
 //! ```
 
 pub mod clock;
+pub mod criteria;
 mod error;
 mod examine;
 pub mod guard;

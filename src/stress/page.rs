@@ -1,6 +1,7 @@
 //! Formats the outcomes of the stress battery as a table, a documentation page and JSON.
 
-use super::{CRITERIA, Outcome, Verdict};
+use super::{Outcome, Verdict};
+use crate::sim::criteria::CRITERIA;
 use crate::verify::{Table, number};
 use serde::Serialize;
 
@@ -71,7 +72,7 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
 pub fn json(outcomes: &[Outcome]) -> serde_json::Result<String> {
     #[derive(Serialize)]
     struct All<'a> {
-        criteria: &'a super::Criteria,
+        criteria: &'a crate::sim::criteria::Criteria,
         outcomes: &'a [Outcome],
     }
     serde_json::to_string_pretty(&All { criteria: &CRITERIA, outcomes })

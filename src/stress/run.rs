@@ -1,8 +1,9 @@
 //! Runs trials and stores the scenes of failed ones.
 
-use super::{CRITERIA, Outcome, Trial, Verdict, judge};
+use super::{Outcome, Trial, Verdict, judge};
 use crate::cases::{CaseError, plan_of};
 use crate::session::march;
+use crate::sim::criteria::CRITERIA;
 use crate::sim::{self, Run};
 use crate::space::mesh::Axis;
 use crate::threads;

@@ -1,7 +1,7 @@
-//! This module reads one run of a comparison from a folder, a recording or a summary.
+//! This module reads a run back from its folder, a recording or a summary.
 
+use super::later;
 use super::table::{SECONDS, Table};
-use super::{RunHead, later};
 use crate::frame::RunInfo;
 use crate::record::folder::FILES;
 use crate::record::info::run_info;
@@ -11,9 +11,9 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Error of comparing runs.
+/// Error of reading runs back.
 #[derive(Debug, thiserror::Error)]
-pub enum CompareError {
+pub enum ResultsError {
     /// The path does not exist.
     #[error("{}: there is no such file or folder; give a run's folder, a recording (.rrd) or a summary.json", .0.display())]
     Missing(PathBuf),
@@ -86,7 +86,7 @@ struct Gauge {
 
 /// A run that was read.
 pub struct Member {
-    /// Name of the run in the comparison.
+    /// Name of the run, unique among those that were opened together.
     pub name: String,
     /// Path of its folder or file.
     pub path: PathBuf,
@@ -109,9 +109,9 @@ pub struct Member {
 }
 
 /// Reads runs and gives them different names.
-pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, CompareError> {
+pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, ResultsError> {
     if paths.len() < 2 {
-        return Err(CompareError::Usage(
+        return Err(ResultsError::Usage(
             "one run alone cannot be compared; give two or more: grainscope compare runs/silo \
              runs/silo-2"
                 .into(),
@@ -122,7 +122,7 @@ pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, CompareError> {
         let member = Member::open(path)?;
         let place = |m: &Member| std::fs::canonicalize(&m.path).unwrap_or(m.path.clone());
         if let Some(twin) = members.iter().find(|m| place(m) == place(&member)) {
-            return Err(CompareError::Usage(format!(
+            return Err(ResultsError::Usage(format!(
                 "{} and {} are the same run; give two different ones",
                 twin.path.display(),
                 path.display()
@@ -143,12 +143,12 @@ pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, CompareError> {
 
 impl Member {
     /// Reads a run from its folder, from a file in its folder, or from a recording or summary.
-    pub fn open(path: &Path) -> Result<Member, CompareError> {
+    pub fn open(path: &Path) -> Result<Member, ResultsError> {
         if path.is_dir() {
             return Self::folder(path);
         }
         if !path.is_file() {
-            return Err(CompareError::Missing(path.to_owned()));
+            return Err(ResultsError::Missing(path.to_owned()));
         }
         let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let beside = path.parent().unwrap_or(Path::new("")).join("series.csv");
@@ -159,20 +159,20 @@ impl Member {
         match path.extension().and_then(|e| e.to_str()) {
             Some("rrd") => Self::recording(path),
             Some("json") => Self::golden(path),
-            _ => Err(CompareError::Unknown(path.to_owned())),
+            _ => Err(ResultsError::Unknown(path.to_owned())),
         }
     }
 
-    fn folder(folder: &Path) -> Result<Member, CompareError> {
+    fn folder(folder: &Path) -> Result<Member, ResultsError> {
         let file = |name: &str| Some(folder.join(name)).filter(|p| p.is_file());
         let Some(series) = file("series.csv") else {
             return match (file("recording.rrd"), file("summary.json")) {
                 (Some(recording), _) => Self::recording(&recording),
                 (None, Some(summary)) => Self::golden(&summary),
-                (None, None) => Err(CompareError::NoRun(folder.to_owned())),
+                (None, None) => Err(ResultsError::NoRun(folder.to_owned())),
             };
         };
-        let broken = |cause| CompareError::Broken { path: series.clone(), cause };
+        let broken = |cause| ResultsError::Broken { path: series.clone(), cause };
         let table = Table::parse(&read(&series)?).map_err(broken)?;
         let mut member = Member {
             name: folder_name(folder),
@@ -201,10 +201,10 @@ impl Member {
         Ok(member)
     }
 
-    fn recording(path: &Path) -> Result<Member, CompareError> {
+    fn recording(path: &Path) -> Result<Member, ResultsError> {
         let recorded = Recorded::open(path)?;
         let broken =
-            |cause: &str| CompareError::Broken { path: path.to_owned(), cause: cause.into() };
+            |cause: &str| ResultsError::Broken { path: path.to_owned(), cause: cause.into() };
         let table = Table::of_recording(&recorded.curves())
             .ok_or_else(|| broken("the recording holds no series; was it cut at the start?"))?;
         let mut member = Member {
@@ -228,7 +228,7 @@ impl Member {
         Ok(member)
     }
 
-    fn golden(path: &Path) -> Result<Member, CompareError> {
+    fn golden(path: &Path) -> Result<Member, ResultsError> {
         let summary = Summary::read(path)?;
         let beside = path.parent().unwrap_or(Path::new("")).join("scene.toml");
         let named = path.file_stem().is_some_and(|s| s != "summary");
@@ -281,7 +281,7 @@ impl Member {
     }
 
     /// Resolves the scene: domain, walls and plots.
-    fn resolve(&mut self) -> Result<(), CompareError> {
+    fn resolve(&mut self) -> Result<(), ResultsError> {
         let Some(text) = &self.scene_toml else { return Ok(()) };
         let source = SceneSource::new(format!("scene of {}", self.path.display()), text.as_str());
         let scene = scene::parse(&source)?;
@@ -304,24 +304,14 @@ impl Member {
         self.summary.as_ref().map(|s| s.state_hash.as_str())
     }
 
-    /// Identity of the run; `first` is the reference run.
-    pub(super) fn head(&self, first: &Member) -> RunHead {
+    /// Name and hash of the scene; `None` if unknown.
+    pub fn scene(&self) -> Option<(String, String)> {
         let known = self.summary.as_ref().map(|s| (s.scene.clone(), s.scene_hash.clone()));
-        let (scene, scene_hash) = known.or(self.scene.clone()).unzip();
-        RunHead {
-            name: self.name.clone(),
-            path: self.path.display().to_string(),
-            kind: self.kind,
-            scene,
-            scene_hash,
-            state_hash: self.state_hash().map(String::from),
-            end: self.end,
-            identical: self.state_hash().zip(first.state_hash()).map(|(a, b)| a == b),
-        }
+        known.or(self.scene.clone())
     }
 
     /// Values at a time; `None` if they are unknown there.
-    pub(super) fn values_at(&self, time: f64) -> Option<IndexMap<String, f64>> {
+    pub fn values_at(&self, time: f64) -> Option<IndexMap<String, f64>> {
         let mut values = IndexMap::from([("end".to_string(), self.end)]);
         match &self.table {
             Some(table) => {
@@ -344,8 +334,8 @@ impl Member {
 }
 
 impl Summary {
-    fn read(path: &Path) -> Result<Summary, CompareError> {
-        let broken = |cause: String| CompareError::Broken { path: path.to_owned(), cause };
+    fn read(path: &Path) -> Result<Summary, ResultsError> {
+        let broken = |cause: String| ResultsError::Broken { path: path.to_owned(), cause };
         let summary: Summary = serde_json::from_str(&read(path)?).map_err(|e| {
             broken(format!(
                 "is not the summary of a run: {e}; expected a summary.json of `grainscope run`"
@@ -384,8 +374,8 @@ impl Summary {
     }
 }
 
-fn read(path: &Path) -> Result<String, CompareError> {
-    std::fs::read_to_string(path).map_err(|e| CompareError::Broken {
+fn read(path: &Path) -> Result<String, ResultsError> {
+    std::fs::read_to_string(path).map_err(|e| ResultsError::Broken {
         path: path.to_owned(),
         cause: format!("cannot be read: {e}"),
     })

@@ -1,0 +1,51 @@
+//! Bounds that every run must satisfy at every step, whoever runs it.
+
+use serde::Serialize;
+
+/// Upper bounds that every run must satisfy at every step.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Criteria {
+    /// Relative difference between the power of the loads and the dissipation.
+    pub power: f64,
+    /// Divergence of the velocity relative to the strain rate, L2 norm.
+    pub divergence: f64,
+    /// Number of solver corrections in a step, summed over its solutions.
+    pub corrections: f64,
+    /// Sum over cells of |volume of particles - area|, over the total area, relative to the share
+    /// of one row of particles in a cell; incompressible scenes.
+    pub misplaced: f64,
+    /// Relative change of a material's projected area.
+    pub drift: f64,
+    /// Relative change of the volume of all particles; incompressible scenes that no particle
+    /// leaves.
+    pub volume: f64,
+    /// Largest deviation of a director's length from 1, `| |n| - 1 |`.
+    pub director: f64,
+    /// Number of particles outside the domain or inside a solid.
+    pub outside: f64,
+    /// Largest speed over the largest initial speed, or over a tenth of the scene's unit of speed
+    /// if that is larger.
+    pub growth: f64,
+    /// Largest excess of a carried viscosity or density beyond its initial range, relative to the
+    /// larger bound of that range; incompressible scenes.
+    pub extrema: f64,
+    /// Smallest factor between a value and its bound at which a trial passes; below it the margin
+    /// is reported.
+    pub margin: f64,
+}
+
+/// The bounds of all trials. The bound of the drift holds for a coarse mesh, on which a row of
+/// particles is a large part of an interface.
+pub const CRITERIA: Criteria = Criteria {
+    power: 1e-6,
+    divergence: 1e-9,
+    corrections: 40.0,
+    misplaced: 1.0,
+    drift: 0.05,
+    volume: 1e-10,
+    director: 1e-12,
+    outside: 0.0,
+    growth: 100.0,
+    extrema: 0.05,
+    margin: 2.0,
+};
