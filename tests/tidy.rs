@@ -19,17 +19,7 @@ const MODULES: [(&str, &[&str]); 24] = [
     ("motion", &["laws", "space", "plan", "threads", "simd"]),
     (
         "sim",
-        &[
-            "laws",
-            "frame",
-            "scene",
-            "space",
-            "composition",
-            "plan",
-            "solve",
-            "motion",
-            "threads",
-        ],
+        &["laws", "frame", "scene", "space", "composition", "plan", "solve", "motion", "threads"],
     ),
     ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
     ("verify", &["scene", "plan", "sim", "cases"]),
@@ -212,9 +202,8 @@ fn imports_follow_the_layers() {
         for (number, used) in imports(&path) {
             let first = used.split("::").next().unwrap();
             let known = MODULES.iter().any(|(name, _)| *name == first);
-            let law = own == "composition"
-                && first == "laws"
-                && !used.starts_with(COMPOSITION_FROM_LAWS);
+            let law =
+                own == "composition" && first == "laws" && !used.starts_with(COMPOSITION_FROM_LAWS);
             if known && first != own && !allowed.contains(&first) || law {
                 faults.push(format!("{}:{number}: {own} imports {used}", path.display()));
             }

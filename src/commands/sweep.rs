@@ -1,21 +1,19 @@
 //! This module implements `grainscope sweep`: many runs of one scene, on this machine or through
 //! HyperQueue.
 
-use super::{Failure, compare as comparison, print};
-use crate::compare;
-use crate::record::rerun_log::Sink;
+mod one;
+mod results;
+
+use super::{Failure, print};
 use crate::record::text::duration;
-use crate::scene::SceneSource;
-use crate::session::{
-    Interrupted, Options, Recording, Session, SessionError, progress_bar, watch_interrupts,
-};
-use crate::sweep::collect::Collection;
+use crate::session::{progress_bar, watch_interrupts};
 use crate::sweep::{
     Case, Engine, Event, HyperQueue, Limits, List, Local, Spec, State, Store, SweepError, Work,
     preset_list, preset_source, read_file, similar,
 };
+use one::one;
+use results::collect;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -320,62 +318,6 @@ fn verdict(store: &Store, list: &List) -> Result<(), Failure> {
     )))
 }
 
-/// Runs one case in this process.
-fn one(store: &Store, name: &str, stop_with_input: bool) -> Result<(), Failure> {
-    let (list, source) = store.read()?;
-    let case = list.case(name)?;
-    let interrupted = watch_interrupts(super::code::INTERRUPTED);
-    if stop_with_input {
-        watch_input(&interrupted)?;
-    }
-    let Some(attempt) = store.begin(&case.id)? else {
-        return Ok(());
-    };
-    let outcome = solve(case, &source, attempt.folder(), list.spec.recordings, &interrupted);
-    match outcome {
-        Ok(()) => Ok(attempt.finish()?),
-        Err(Failure::Interrupted) => {
-            attempt.abandon();
-            Err(Failure::Interrupted)
-        }
-        Err(failure) => {
-            let cause = failure.describe().unwrap_or_else(|| "it failed".into());
-            attempt.fail(&cause)?;
-            Err(failure)
-        }
-    }
-}
-
-/// Runs a case into a folder.
-fn solve(
-    case: &Case,
-    source: &SceneSource,
-    folder: &Path,
-    recorded: bool,
-    interrupted: &Interrupted,
-) -> Result<(), Failure> {
-    let plan = Arc::new(case.plan(source)?);
-    let recording = if recorded { Recording::Folder } else { Recording::None };
-    let options = Options { quiet: true, recording, ..Options::default() };
-    let folder = || Ok::<_, SessionError>(folder.to_owned());
-    Session::start(&options, &plan, interrupted.clone(), folder)?.go_silently(|_| ())?;
-    Ok(())
-}
-
-/// Treats the end of the standard input as an interrupt, so that no case outlives its sweep.
-fn watch_input(interrupted: &Interrupted) -> Result<(), Failure> {
-    let flag = interrupted.clone();
-    let watch = move || {
-        // No data arrive; the copy returns at the end of the input or on a read error.
-        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
-        flag.store(true, Ordering::SeqCst);
-    };
-    match std::thread::Builder::new().name("input".into()).spawn(watch) {
-        Ok(_) => Ok(()),
-        Err(e) => Err(Failure::Environment(format!("a thread cannot be started: {e}"))),
-    }
-}
-
 /// Prints the cases, or the ids of those that are not done.
 fn show_list(store: &Store, missing: bool) -> Result<(), Failure> {
     let (list, _) = store.read()?;
@@ -422,54 +364,4 @@ fn plan_text(open: &[&Case], args: &Args) -> String {
     };
     lines.push(format!("{} cases would run, {on}", open.len()));
     lines.join("\n")
-}
-
-/// Writes tables, plots and, on request, a recording side by side of the named cases, or of those
-/// of the first seed.
-fn collect(store: &Store, list: &List, side_by_side: Option<&[String]>) -> Result<(), Failure> {
-    let found = Collection::new(store, list)?;
-    let mut files = found.write_tables(store.root())?;
-    for stem in found.plot(store.root(), &list.spec.plots)? {
-        let mut name = stem.into_os_string();
-        name.push(".svg, .png");
-        files.push(name.into());
-    }
-    let mut text = found.terminal();
-    text += &format!("\n{} of {} cases are done\n", found.done(), list.cases.len());
-    if let Some(named) = side_by_side {
-        let cases =
-            if named.is_empty() { of_first_seed(store, list) } else { chosen(list, named)? };
-        if cases.len() > 1 {
-            files.push(beside(store, &cases)?);
-        }
-    }
-    for file in files {
-        text += &format!("wrote {}\n", file.display());
-    }
-    print(&text)
-}
-
-/// Finds cases by number or id.
-fn chosen<'a>(list: &'a List, named: &[String]) -> Result<Vec<&'a Case>, Failure> {
-    Ok(named.iter().map(|name| list.case(name)).collect::<Result<_, _>>()?)
-}
-
-/// Finished cases of the first seed, at most [`MOST_SIDE_BY_SIDE`].
-fn of_first_seed<'a>(store: &Store, list: &'a List) -> Vec<&'a Case> {
-    let first = list.cases.first().and_then(|c| c.seed);
-    let done = list.cases.iter().filter(|c| c.seed == first && store.state(&c.id) == State::Done);
-    done.take(MOST_SIDE_BY_SIDE).collect()
-}
-
-/// Writes one recording and plots of some cases, compared with the first of them.
-fn beside(store: &Store, cases: &[&Case]) -> Result<PathBuf, Failure> {
-    let folders: Vec<PathBuf> = cases.iter().map(|c| store.done(&c.id)).collect();
-    let mut members = crate::results::open_all(&folders)?;
-    for (member, case) in members.iter_mut().zip(cases) {
-        member.rename(&case.label());
-    }
-    let path = store.root().join("side_by_side.rrd");
-    let found = compare::compare(&members, &[])?;
-    comparison::write(found, &members, &path, &[Sink::Save(path.clone())])?;
-    Ok(path)
 }

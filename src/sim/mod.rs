@@ -23,6 +23,7 @@ pub mod picture;
 pub mod row;
 mod run;
 mod sampling;
+mod saving;
 mod simulation;
 mod solution;
 pub mod state;

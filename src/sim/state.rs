@@ -5,13 +5,7 @@
 //! (integration points, matrices, loads) does not. A new field is a new column: readers ask for
 //! columns by name.
 
-use super::clock::Limiter;
 use super::phases::Phases;
-use super::row::{self, COLUMNS, GaugeRow, Row};
-use super::simulation::{Before, Simulation};
-use crate::space::flow::Flow;
-use crate::space::particles::Particles;
-use crate::space::population::Count;
 use std::collections::BTreeMap;
 
 /// Values of one kind.
@@ -125,7 +119,7 @@ impl State {
     }
 
     /// `count` numbers.
-    fn exactly(&self, name: &str, count: usize) -> Result<&[f64], StateError> {
+    pub(super) fn exactly(&self, name: &str, count: usize) -> Result<&[f64], StateError> {
         let values = self.floats(name)?;
         if values.len() == count {
             Ok(values)
@@ -135,7 +129,7 @@ impl State {
     }
 
     /// `count` tuples of numbers.
-    fn tuples<const N: usize>(
+    pub(super) fn tuples<const N: usize>(
         &self,
         name: &str,
         count: usize,
@@ -149,160 +143,12 @@ fn refill<T>(kept: &mut Vec<T>, values: impl IntoIterator<Item = T>) {
     kept.extend(values);
 }
 
-fn wrong_length(name: &str, found: usize, expected: usize) -> StateError {
+pub(super) fn wrong_length(name: &str, found: usize, expected: usize) -> StateError {
     StateError::Length { name: name.into(), found, expected }
 }
 
-fn flat<const N: usize>(tuples: &[[f64; N]]) -> impl Iterator<Item = f64> + '_ {
+pub(super) fn flat<const N: usize>(tuples: &[[f64; N]]) -> impl Iterator<Item = f64> + '_ {
     tuples.as_flattened().iter().copied()
-}
-
-fn save_particles(p: &Particles, s: &mut State) {
-    s.put_floats("particles.position", flat(&p.position));
-    s.put_floats("particles.volume", p.volume.iter().copied());
-    s.put_bytes("particles.material", p.material.iter().copied());
-    if let Some(d) = &p.director {
-        s.put_floats("particles.director", flat(d));
-    }
-    if let Some(v) = &p.viscosity {
-        s.put_floats("particles.viscosity", v.iter().copied());
-    }
-    if let Some(d) = &p.density {
-        s.put_floats("particles.density", d.iter().copied());
-    }
-    if let Some(m) = &p.mark {
-        s.put_bytes("particles.mark", m.iter().map(|&m| u8::from(m)));
-    }
-}
-
-/// Particles with the columns that `like` has; not sorted yet.
-fn load_particles(s: &State, like: &Particles, materials: usize) -> Result<Particles, StateError> {
-    let material = s.bytes("particles.material")?.to_vec();
-    let n = material.len();
-    if let Some(m) = material.iter().find(|&&m| usize::from(m) >= materials) {
-        return Err(StateError::Range { name: "particles.material", value: m.to_string() });
-    }
-    let position = s.tuples("particles.position", n)?;
-    if let Some(p) = position.iter().flatten().find(|v: &&f64| !v.is_finite()) {
-        return Err(StateError::Range { name: "particles.position", value: p.to_string() });
-    }
-    let column = |exists: bool, name: &str| -> Result<Option<Vec<f64>>, StateError> {
-        exists.then(|| Ok(s.exactly(name, n)?.to_vec())).transpose()
-    };
-    let mark = match &like.mark {
-        None => None,
-        Some(_) => {
-            let mark = s.bytes("particles.mark")?;
-            if mark.len() != n {
-                return Err(wrong_length("particles.mark", mark.len(), n));
-            }
-            Some(mark.iter().map(|&m| m != 0).collect())
-        }
-    };
-    Ok(Particles {
-        position,
-        volume: s.exactly("particles.volume", n)?.to_vec(),
-        material,
-        director: like.director.as_ref().map(|_| s.tuples("particles.director", n)).transpose()?,
-        viscosity: column(like.viscosity.is_some(), "particles.viscosity")?,
-        density: column(like.density.is_some(), "particles.density")?,
-        mark,
-        ..Particles::default()
-    })
-}
-
-/// Columns of a row that the format keeps in one list of numbers, in this order. A column that the
-/// registry gains later is saved under its own name.
-const ROW_NUMBERS: [&str; 15] = [
-    "time",
-    "dt",
-    "wall",
-    "power_in",
-    "dissipation",
-    "stabilisation",
-    "power_error",
-    "divergence_error",
-    "volume_error",
-    "max_speed",
-    "rms_speed",
-    "potential_energy",
-    "work",
-    "dissipated",
-    "director_error",
-];
-
-/// The same for counts; the limiter is saved by its place in [`Limiter::ALL`].
-const ROW_COUNTS: [&str; 8] = [
-    "step",
-    "dt_limiter",
-    "iterations",
-    "particles",
-    "active_rotation",
-    "splits",
-    "merges",
-    "held",
-];
-
-/// The value of a column by name.
-fn of_row(row: &Row, name: &str) -> f64 {
-    COLUMNS.iter().find(|c| c.name == name).map_or(f64::NAN, |c| c.number(row))
-}
-
-fn save_row(row: &Row, s: &mut State) {
-    let limiter = Limiter::ALL.iter().position(|&l| l == row.dt_limiter).unwrap_or(0);
-    let count = |name| if name == "dt_limiter" { limiter as u64 } else { of_row(row, name) as u64 };
-    s.put_counts("row.counts", ROW_COUNTS.map(count));
-    s.put_floats("row.numbers", ROW_NUMBERS.map(|name| of_row(row, name)));
-    s.put_floats("row.alignment", row.mean_alignment);
-    for column in later_columns() {
-        s.put_floats(&format!("row.{}", column.name), [column.number(row)]);
-    }
-    s.put_floats("row.gauges", row.gauges.iter().flat_map(|g| [g.volume, g.rate]));
-    s.put_floats("row.drift", row.drift.iter().copied());
-    save_phases("row.seconds", &row.seconds, s);
-}
-
-/// Columns that the first version of the format did not have.
-fn later_columns() -> impl Iterator<Item = &'static row::Column> {
-    let known = |c: &&row::Column| {
-        ROW_NUMBERS.contains(&c.name) || ROW_COUNTS.contains(&c.name) || c.name == "mean_alignment"
-    };
-    COLUMNS.iter().filter(move |c| !known(c))
-}
-
-fn load_row(s: &State, gauges: usize, materials: usize) -> Result<Row, StateError> {
-    let counts: [u64; 8] = s.tally("row.counts")?;
-    let numbers: [f64; 15] = s.numbers("row.numbers")?;
-    let out_of_range =
-        |name: &'static str, value: u64| StateError::Range { name, value: value.to_string() };
-    let limiter = usize::try_from(counts[1]).ok().and_then(|k| Limiter::ALL.get(k));
-    let limiter = limiter.ok_or_else(|| out_of_range("row.counts (limiter)", counts[1]))?;
-    let mut row = Row::empty(materials);
-    let mut set = |name: &str, text: &str| {
-        let column = COLUMNS.iter().find(|c| c.name == name);
-        column.is_none_or(|c| c.set(&mut row, text).is_ok())
-    };
-    for (name, value) in ROW_COUNTS.into_iter().zip(counts) {
-        let text = if name == "dt_limiter" { limiter.name().into() } else { value.to_string() };
-        if !set(name, &text) {
-            return Err(out_of_range("row.counts", value));
-        }
-    }
-    // Numbers are written such that they are read back to the last bit.
-    let list = ROW_NUMBERS.into_iter().zip(numbers);
-    let later = later_columns().map(|c| {
-        let value = s.try_floats(&format!("row.{}", c.name)).and_then(|v| v.first().copied());
-        (c.name, value.unwrap_or(f64::NAN))
-    });
-    list.chain(later).for_each(|(name, value)| {
-        set(name, &value.to_string());
-    });
-    row.mean_alignment = s.floats("row.alignment")?.first().copied();
-    let tuples = s.tuples("row.gauges", gauges)?;
-    row.gauges = tuples.into_iter().map(|[volume, rate]| GaugeRow { volume, rate }).collect();
-    row.drift = s.exactly("row.drift", materials)?.to_vec();
-    row.seconds = load_phases("row.seconds", s)?;
-    Ok(row)
 }
 
 /// Writes seconds by phase.
@@ -315,106 +161,4 @@ pub fn load_phases(name: &str, s: &State) -> Result<Phases, StateError> {
     let [quadrature, weight, assemble, factor, solve, motion, dye, population, diagnostics] =
         s.numbers(name)?;
     Ok(Phases { quadrature, weight, assemble, factor, solve, motion, dye, population, diagnostics })
-}
-
-impl<const D: usize> Simulation<D> {
-    /// Everything that the next step depends on.
-    pub(super) fn save(&self, s: &mut State) {
-        save_particles(&self.particles, s);
-        s.put_floats("flow.velocity", flat(&self.flow.velocity));
-        s.put_floats("flow.pressure", flat(&self.flow.pressure));
-        let names = ["previous.velocity", "previous.pressure", "previous.step"];
-        if let Some(Before { flow, dt }) = &self.previous {
-            s.put_floats(names[0], flat(&flow.velocity));
-            s.put_floats(names[1], flat(&flow.pressure));
-            s.put_floats(names[2], [*dt]);
-        } else {
-            names.iter().for_each(|name| s.remove(name));
-        }
-        // The points follow from the factors that they were made with; the new factors from both.
-        s.put_floats("quadrature.factors", self.factors_of_points.iter().copied());
-        s.put_floats("gauges", self.gauges.iter().map(|g| g.volume));
-        if let Some(dye) = &self.dye {
-            s.put_floats("dye.points", dye.lines.iter().flatten().flatten().copied());
-            s.put_counts("dye.lines", dye.lines.iter().map(|l| l.len() as u64));
-        }
-        let c = self.count;
-        s.put_counts("count", [c.splits, c.merges, c.held, c.left, c.healed]);
-        s.put_counts("progress", [self.step, u64::from(self.version), self.next_change as u64]);
-        s.put_floats("time", [self.time]);
-        s.put_floats("baseline", self.baseline.iter().copied());
-        s.put_floats("other_power", [self.last_other_power]);
-        save_row(&self.row, s);
-    }
-
-    /// Goes back, or ahead, to a state of a run of the same plan. After an error the run is what it
-    /// was before.
-    pub(super) fn load(&mut self, s: &State) -> Result<(), StateError> {
-        let plan = self.plan.clone();
-        let (mesh, materials) = (&plan.mesh, self.matter.materials.len());
-        let mut particles = load_particles(s, &self.particles, materials)?;
-        let flow = Flow {
-            velocity: s.tuples("flow.velocity", mesh.nodes())?,
-            pressure: s.tuples("flow.pressure", mesh.cells())?,
-        };
-        let previous = match s.try_floats("previous.velocity") {
-            None => None,
-            Some(_) => {
-                let [dt] = s.numbers("previous.step")?;
-                let velocity = s.tuples("previous.velocity", mesh.nodes())?;
-                let pressure = s.tuples("previous.pressure", mesh.cells())?;
-                Some(Before { flow: Flow { velocity, pressure }, dt })
-            }
-        };
-        let factors = s.exactly("quadrature.factors", materials)?;
-        let gauges = s.exactly("gauges", self.gauges.len())?;
-        let dye = self.dye.as_ref().map(|_| dye_lines(s)).transpose()?;
-        let [splits, merges, held, left, healed] = s.tally("count")?;
-        let [step, version, next_change] = s.tally("progress")?;
-        let changes = plan.changes.get(..next_change as usize).ok_or(StateError::Range {
-            name: "progress (changes)",
-            value: next_change.to_string(),
-        })?;
-        let version = u32::try_from(version).map_err(|_| StateError::Range {
-            name: "progress (version)",
-            value: version.to_string(),
-        })?;
-        let [time] = s.numbers("time")?;
-        let baseline = s.exactly("baseline", materials)?;
-        let [last_other_power] = s.numbers("other_power")?;
-        let row = load_row(s, self.gauges.len(), materials)?;
-
-        particles.sort(mesh);
-        self.matter = changes.last().map_or(&plan.state, |c| &c.state).clone();
-        self.quadrature.composition_mut().set_factors(factors);
-        self.factors_of_points = factors.to_vec();
-        self.quadrature
-            .update(mesh, &particles, &self.matter.materials, version, &(&**mesh, &flow))
-            .map_err(|e| StateError::Range { name: "particles.position", value: e.to_string() })?;
-        self.particles = particles;
-        self.flow = flow;
-        self.previous = previous;
-        for (gauge, &volume) in self.gauges.iter_mut().zip(gauges) {
-            gauge.volume = volume;
-        }
-        if let (Some(dye), Some(lines)) = (&mut self.dye, dye) {
-            dye.lines = lines;
-        }
-        self.count = Count { splits, merges, held, left, healed };
-        (self.step, self.version, self.next_change) = (step, version, next_change as usize);
-        self.time = time;
-        self.baseline = baseline.to_vec();
-        self.last_other_power = last_other_power;
-        self.row = row;
-        self.events.clear();
-        Ok(())
-    }
-}
-
-fn dye_lines(s: &State) -> Result<Vec<Vec<[f64; 2]>>, StateError> {
-    let lengths = s.counts("dye.lines")?;
-    let total = lengths.iter().fold(0u64, |a, &b| a.saturating_add(b));
-    let count = usize::try_from(total).unwrap_or(usize::MAX / 2);
-    let mut points = s.tuples::<2>("dye.points", count.min(usize::MAX / 2))?.into_iter();
-    Ok(lengths.iter().map(|&n| points.by_ref().take(n as usize).collect()).collect())
 }

@@ -2,6 +2,7 @@
 //! needs are absent.
 
 use super::mesh::Mesh;
+use crate::laws::director;
 use crate::threads::{self, Divisible};
 
 /// A column that exists only if an effect needs it.
@@ -283,6 +284,48 @@ impl Particles {
             [if usize::from(self.material[p]) == material { self.volume[p] } else { 0.0 }]
         });
         total
+    }
+}
+
+impl Particles {
+    /// Appends a particle of a material without carried values.
+    pub fn push(&mut self, position: [f64; 2], volume: f64, material: u8) {
+        self.position.push(position);
+        self.volume.push(volume);
+        self.material.push(material);
+        if let Some(d) = &mut self.director {
+            d.push([0.0, 1.0]);
+        }
+        if let Some(v) = &mut self.viscosity {
+            v.push(0.0);
+        }
+        if let Some(d) = &mut self.density {
+            d.push(0.0);
+        }
+        if let Some(m) = &mut self.mark {
+            m.push(false);
+        }
+    }
+
+    /// Merges particle `b` into particle `a`, which keeps its index; `b` is not removed. Volumes
+    /// add up, position and carried values are means weighted by volume, and directors are averaged
+    /// regardless of their sign.
+    pub fn absorb(&mut self, a: usize, b: usize) {
+        let (va, vb) = (self.volume[a], self.volume[b]);
+        let (fa, fb) = (va / (va + vb), vb / (va + vb));
+        self.volume[a] = va + vb;
+        for c in 0..2 {
+            self.position[a][c] = fa * self.position[a][c] + fb * self.position[b][c];
+        }
+        if let Some(d) = &mut self.director {
+            let [p, q] = [d[a], d[b]];
+            let product = |i: usize, j: usize| fa * p[i] * p[j] + fb * q[i] * q[j];
+            let n = director::axis(product(0, 0), product(1, 1), product(0, 1));
+            d[a] = [n.x, n.y];
+        }
+        for column in [&mut self.viscosity, &mut self.density].into_iter().flatten() {
+            column[a] = fa * column[a] + fb * column[b];
+        }
     }
 }
 

@@ -14,18 +14,20 @@
 //! **Threads** take subtrees of their own. Sums have one order, so that no bit of the result depends
 //! on their number.
 
+mod factorize;
+mod substitute;
+
 mod front;
 mod kernels;
 pub mod tree;
 
-use super::element::{CellBlocks, pair};
+use super::element::CellBlocks;
 use crate::simd::Simd;
-use crate::threads;
-use front::{Child, Matrix, Size};
-use kernels::Columns;
-use std::ops::Range;
+use factorize::Factorize;
+use front::Size;
 use std::sync::Arc;
-use tree::{Run, Source, Tree};
+use substitute::{Sweep, Unknowns};
+use tree::{Source, Tree};
 
 /// Sides, in cells, of the largest rectangles that are redone whole.
 const KEPT_SIDE: u32 = 8;
@@ -277,245 +279,6 @@ fn workspace<const D: usize>(tree: &Tree, f: usize) -> usize {
             updates + below.unwrap_or(0)
         }
     }
-}
-
-/// One factorisation.
-struct Factorize<'a, const D: usize> {
-    tree: &'a Tree,
-    stale: &'a [bool],
-    simd: Simd,
-    cells: &'a [CellBlocks<D>],
-}
-
-impl<const D: usize> Factorize<'_, D> {
-    /// A subtree whose update is kept; `part` holds just this subtree.
-    fn kept(
-        &self,
-        f: usize,
-        mut part: Part,
-        work: &mut [Vec<f64>],
-    ) -> Result<(), NotPositiveDefinite> {
-        if !self.stale[f] {
-            return Ok(());
-        }
-        let [mut below, here] = part.split(f);
-        let runs = match &self.tree.fronts[f].source {
-            Source::Children(runs) if !here.places.whole[f] => runs,
-            _ => return self.whole(f, below, here.factor, here.updates, &mut work[0]),
-        };
-        let [left, right] = self.tree.children(f);
-        let [mut a, mut b] = below.split(left + 1);
-        let shared = work.len() > 1 && self.tree.fronts[f].subtree > SHARED_FRONTS;
-        let (first, second) = if shared {
-            let (w0, w1) = work.split_at_mut(work.len() / 2);
-            threads::both(
-                true,
-                || self.kept(left, a.reborrow(), w0),
-                || self.kept(right, b.reborrow(), w1),
-            )
-        } else {
-            (self.kept(left, a.reborrow(), work), self.kept(right, b.reborrow(), work))
-        };
-        first.and(second)?;
-        let updates = [(left, &a), (right, &b)].map(|(child, part)| {
-            let update = size::<D>(self.tree, child).update();
-            &part.updates[part.updates.len() - update..]
-        });
-        let size = size::<D>(self.tree, f);
-        let mut matrix = Matrix { size, panel: here.factor, update: here.updates };
-        self.assemble(&mut matrix, [left, right], updates, runs);
-        self.eliminate(f, matrix)
-    }
-
-    /// A subtree that is redone whole, with all updates below it in `work`.
-    fn whole(
-        &self,
-        f: usize,
-        mut below: Part,
-        panel: &mut [f64],
-        update: &mut [f64],
-        work: &mut [f64],
-    ) -> Result<(), NotPositiveDefinite> {
-        let mut matrix = Matrix { size: size::<D>(self.tree, f), panel, update };
-        match &self.tree.fronts[f].source {
-            Source::Cells(cells) => {
-                matrix.clear();
-                for c in cells {
-                    add_cell(&mut matrix, &c.nodes, &self.cells[c.cell as usize]);
-                }
-            }
-            Source::Children(runs) => {
-                let children = self.tree.children(f);
-                let [left, right] = children.map(|c| size::<D>(self.tree, c).update());
-                let (left, rest) = work.split_at_mut(left);
-                let (right, rest) = rest.split_at_mut(right);
-                let parts = below.split(children[0] + 1);
-                for ((child, mut part), update) in
-                    children.into_iter().zip(parts).zip([&mut *left, &mut *right])
-                {
-                    let [below, here] = part.split(child);
-                    self.whole(child, below, here.factor, update, rest)?;
-                }
-                self.assemble(&mut matrix, children, [left, right], runs);
-            }
-        }
-        self.eliminate(f, matrix)
-    }
-
-    /// A front from its children's updates.
-    fn assemble(
-        &self,
-        matrix: &mut Matrix,
-        children: [usize; 2],
-        updates: [&[f64]; 2],
-        runs: &[Vec<Run>; 2],
-    ) {
-        let child = |k: usize| Child {
-            rim: size::<D>(self.tree, children[k]).rim,
-            update: updates[k],
-            runs: &runs[k],
-        };
-        matrix.assemble::<D>([child(0), child(1)]);
-    }
-
-    fn eliminate(&self, f: usize, mut matrix: Matrix) -> Result<(), NotPositiveDefinite> {
-        let first = D * self.tree.fronts[f].first as usize;
-        matrix.eliminate(self.simd).map_err(|i| NotPositiveDefinite { unknown: first + i })
-    }
-}
-
-fn add_cell<const D: usize>(matrix: &mut Matrix, nodes: &[u16; 8], blocks: &CellBlocks<D>) {
-    for k in 0..8 {
-        for l in 0..=k {
-            let block = &blocks[pair(k, l)];
-            let at = [nodes[k], nodes[l]].map(usize::from);
-            matrix.add_block([at[0].max(at[1]), at[0].min(at[1])], block, at[0] < at[1]);
-            if k != l && at[0] == at[1] {
-                // A periodic cell that is its own neighbour: both blocks are on the diagonal.
-                matrix.add_block(at, block, true);
-            }
-        }
-    }
-}
-
-/// One solution.
-struct Sweep<'a, const D: usize> {
-    tree: &'a Tree,
-    places: &'a Places,
-    simd: Simd,
-    factor: &'a [f64],
-}
-
-/// Unknowns of a subtree: those that it eliminates, and the vectors of its fronts.
-struct Unknowns<'a> {
-    x: &'a mut [f64],
-    vectors: &'a mut [f64],
-}
-
-impl<const D: usize> Sweep<'_, D> {
-    fn columns(&self, f: usize) -> Columns<'_> {
-        let data = &self.factor[self.places.panel[f]..self.places.panel[f + 1]];
-        Columns { data, ld: size::<D>(self.tree, f).rows() }
-    }
-
-    fn is_shared(&self, f: usize, depth: u32) -> bool {
-        depth > 0 && self.tree.fronts[f].subtree > SHARED_FRONTS
-    }
-
-    /// The two children's parts of a subtree, and the front's own.
-    fn split<'a>(&self, f: usize, u: Unknowns<'a>) -> [Unknowns<'a>; 3] {
-        let [left, right] = self.tree.children(f);
-        let (first, vector) = (self.tree.first_of(f), &self.places.vector);
-        let start = |front: usize| D * self.tree.fronts[front].first as usize;
-        let (x0, x1, x2) = (start(first), start(self.tree.first_of(right)), start(f));
-        let (xl, x) = u.x.split_at_mut(x1 - x0);
-        let (xr, x) = x.split_at_mut(x2 - x1);
-        let (vl, v) = u.vectors.split_at_mut(vector[left + 1] - vector[first]);
-        let (vr, v) = v.split_at_mut(vector[f] - vector[left + 1]);
-        [(xl, vl), (xr, vr), (x, v)].map(|(x, vectors)| Unknowns { x, vectors })
-    }
-
-    /// Forward substitution in a subtree. Each front's vector then holds its own unknowns so far
-    /// and what they add to the right-hand side on its rim.
-    fn forward(&self, f: usize, u: Unknowns, depth: u32) {
-        let size = size::<D>(self.tree, f);
-        let vector = match &self.tree.fronts[f].source {
-            Source::Cells(_) => {
-                begin(size, u.x, u.vectors);
-                u.vectors
-            }
-            Source::Children(runs) => {
-                let [mut left, mut right, here] = self.split(f, u);
-                let [l, r] = self.tree.children(f);
-                threads::both(
-                    self.is_shared(f, depth),
-                    || self.forward(l, left.reborrow(), depth.saturating_sub(1)),
-                    || self.forward(r, right.reborrow(), depth.saturating_sub(1)),
-                );
-                begin(size, here.x, here.vectors);
-                for (child, part, runs) in [(l, &left, &runs[0]), (r, &right, &runs[1])] {
-                    let rim = D * self.tree.fronts[child].rim.len();
-                    let rim = &part.vectors[part.vectors.len() - rim..];
-                    for (to, from) in runs.iter().map(ends::<D>) {
-                        for (t, f) in here.vectors[to].iter_mut().zip(&rim[from]) {
-                            *t += f;
-                        }
-                    }
-                }
-                here.vectors
-            }
-        };
-        let (own, rim) = vector.split_at_mut(size.own);
-        kernels::forward(self.simd, self.columns(f), own, rim);
-    }
-
-    /// Backward substitution in a subtree, whose rim is known from the parent's vector. Each
-    /// front's vector then holds the solution.
-    fn backward(&self, f: usize, u: Unknowns, parent: Option<(&[f64], &[Run])>, depth: u32) {
-        let size = size::<D>(self.tree, f);
-        let (children, here) = match &self.tree.fronts[f].source {
-            Source::Cells(_) => (None, u),
-            Source::Children(runs) => {
-                let [left, right, here] = self.split(f, u);
-                (Some((left, right, runs)), here)
-            }
-        };
-        let (own, rim) = here.vectors.split_at_mut(size.own);
-        if let Some((known, runs)) = parent {
-            for (from, to) in runs.iter().map(ends::<D>) {
-                rim[to].copy_from_slice(&known[from]);
-            }
-        }
-        kernels::backward(self.simd, self.columns(f), own, rim);
-        here.x.copy_from_slice(own);
-        if let Some((left, right, runs)) = children {
-            let [l, r] = self.tree.children(f);
-            let known = &*here.vectors;
-            threads::both(
-                self.is_shared(f, depth),
-                || self.backward(l, left, Some((known, &runs[0])), depth.saturating_sub(1)),
-                || self.backward(r, right, Some((known, &runs[1])), depth.saturating_sub(1)),
-            );
-        }
-    }
-}
-
-impl Unknowns<'_> {
-    fn reborrow(&mut self) -> Unknowns<'_> {
-        Unknowns { x: self.x, vectors: self.vectors }
-    }
-}
-
-/// A front's vector before anything is added to it.
-fn begin(size: Size, x: &[f64], vector: &mut [f64]) {
-    vector[..size.own].copy_from_slice(x);
-    vector[size.own..].fill(0.0);
-}
-
-/// Unknowns of the parent, and of the child's rim, that a run joins.
-fn ends<const D: usize>(run: &Run) -> (Range<usize>, Range<usize>) {
-    let range = |start: u32| D * start as usize..D * (start + run.len) as usize;
-    (range(run.parent), range(run.child))
 }
 
 #[cfg(test)]

@@ -1,0 +1,63 @@
+//! Collects and compares the cases of a sweep.
+
+use super::super::{Failure, compare as comparison, print};
+use super::*;
+use crate::compare;
+use crate::record::rerun_log::Sink;
+use crate::sweep::collect::Collection;
+use crate::sweep::{Case, List, State, Store};
+use std::path::PathBuf;
+
+/// Writes tables, plots and, on request, a recording side by side of the named cases, or of those
+/// of the first seed.
+pub(super) fn collect(
+    store: &Store,
+    list: &List,
+    side_by_side: Option<&[String]>,
+) -> Result<(), Failure> {
+    let found = Collection::new(store, list)?;
+    let mut files = found.write_tables(store.root())?;
+    for stem in found.plot(store.root(), &list.spec.plots)? {
+        let mut name = stem.into_os_string();
+        name.push(".svg, .png");
+        files.push(name.into());
+    }
+    let mut text = found.terminal();
+    text += &format!("\n{} of {} cases are done\n", found.done(), list.cases.len());
+    if let Some(named) = side_by_side {
+        let cases =
+            if named.is_empty() { of_first_seed(store, list) } else { chosen(list, named)? };
+        if cases.len() > 1 {
+            files.push(beside(store, &cases)?);
+        }
+    }
+    for file in files {
+        text += &format!("wrote {}\n", file.display());
+    }
+    print(&text)
+}
+
+/// Finds cases by number or id.
+pub(super) fn chosen<'a>(list: &'a List, named: &[String]) -> Result<Vec<&'a Case>, Failure> {
+    Ok(named.iter().map(|name| list.case(name)).collect::<Result<_, _>>()?)
+}
+
+/// Finished cases of the first seed, at most [`MOST_SIDE_BY_SIDE`].
+pub(super) fn of_first_seed<'a>(store: &Store, list: &'a List) -> Vec<&'a Case> {
+    let first = list.cases.first().and_then(|c| c.seed);
+    let done = list.cases.iter().filter(|c| c.seed == first && store.state(&c.id) == State::Done);
+    done.take(MOST_SIDE_BY_SIDE).collect()
+}
+
+/// Writes one recording and plots of some cases, compared with the first of them.
+pub(super) fn beside(store: &Store, cases: &[&Case]) -> Result<PathBuf, Failure> {
+    let folders: Vec<PathBuf> = cases.iter().map(|c| store.done(&c.id)).collect();
+    let mut members = crate::results::open_all(&folders)?;
+    for (member, case) in members.iter_mut().zip(cases) {
+        member.rename(&case.label());
+    }
+    let path = store.root().join("side_by_side.rrd");
+    let found = compare::compare(&members, &[])?;
+    comparison::write(found, &members, &path, &[Sink::Save(path.clone())])?;
+    Ok(path)
+}

@@ -1,0 +1,160 @@
+//! Writes what does not change during a run: walls, gauges, texts and the styles of curves.
+
+use super::*;
+use crate::frame::RunInfo;
+use crate::record::color::OKABE_ITO;
+use rerun::archetypes;
+use rerun::components::Radius;
+
+/// The midpoint between the ends of a polyline.
+pub(super) fn middle(points: &[[f32; 2]]) -> [f32; 2] {
+    match (points.first(), points.last()) {
+        (Some(a), Some(b)) => [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])],
+        _ => [0.0, 0.0],
+    }
+}
+
+/// The colour of a curve, lightened where its contrast in the dark theme of the viewer is too low.
+pub(super) fn on_dark(color: [u8; 3]) -> [u8; 3] {
+    match color {
+        [0, 0, 0] => [220, 220, 220],
+        [0, 114, 178] => [64, 160, 224],
+        other => other,
+    }
+}
+
+impl RerunLog {
+    /// Records walls, gauges, legends, and the transform that makes y point up.
+    pub(super) fn world(&mut self, info: &RunInfo) -> Result<(), RecordError> {
+        let world = self.paths.at("world");
+        self.rec
+            .log_static(world.clone(), &archetypes::Transform3D::from_scale([1.0, -1.0, 1.0]))?;
+        let classes = info.materials.iter().enumerate().map(|(i, material)| {
+            let id = u16::try_from(i).unwrap_or(u16::MAX);
+            (id, material.name.as_str(), rgb8(material.rgb))
+        });
+        self.rec.log_static(
+            world,
+            &archetypes::AnnotationContext::new(classes.map(rerun::ClassDescription::from)),
+        )?;
+        self.rec.log_static(
+            self.paths.at("world/particles"),
+            &archetypes::Points2D::update_fields()
+                .with_radii([Radius::new_scene_units(info.particle_radius)])
+                .with_show_labels(false)
+                .with_draw_order(depth::PARTICLES),
+        )?;
+        let walls = info.walls.iter();
+        self.rec.log_static(
+            self.paths.at("world/walls"),
+            &archetypes::LineStrips2D::new(walls.clone().map(|wall| wall.points.as_slice()))
+                .with_labels(walls.map(|wall| wall.name.as_str()))
+                .with_show_labels(false)
+                .with_colors([rgb(WALL)])
+                .with_radii([Radius::new_ui_points(2.5)])
+                .with_draw_order(depth::WALLS),
+        )?;
+        if !info.gauges.is_empty() {
+            let gauges = info.gauges.iter();
+            self.rec.log_static(
+                self.paths.at("world/gauges"),
+                &archetypes::LineStrips2D::new(gauges.clone().map(|gauge| gauge.points.as_slice()))
+                    .with_colors([rgb(GAUGE)])
+                    .with_radii([Radius::new_ui_points(1.5)])
+                    .with_draw_order(depth::GAUGES),
+            )?;
+            let named = gauges.map(|gauge| (middle(&gauge.points), gauge.name.as_str()));
+            self.names("world/gauges/names", named)?;
+        }
+        // A single material needs no legend; with a particle quantity, a colour bar is in its
+        // place.
+        let materials: Vec<_> = info.materials.iter().filter(|material| material.drawn).collect();
+        if info.particle_quantity.is_none() && materials.len() > 1 {
+            let row = bar::row(info.domain, materials.len());
+            let materials = materials.into_iter();
+            self.rec.log_static(
+                self.paths.at("world/materials"),
+                &archetypes::Points2D::new(row.clone())
+                    .with_colors(materials.clone().map(|material| rgb(material.rgb)))
+                    .with_radii([Radius::new_ui_points(7.0)])
+                    .with_draw_order(depth::LEGEND),
+            )?;
+            let named = row.zip(materials.map(|material| material.name.as_str()));
+            self.names("world/materials/names", named)?;
+        }
+        Ok(())
+    }
+
+    /// Writes names below points. They are separate entities because a label takes the colour of
+    /// the labelled point, which may be hard to read.
+    pub(super) fn names<'a>(
+        &self,
+        path: &str,
+        named: impl Iterator<Item = ([f32; 2], &'a str)>,
+    ) -> Result<(), RecordError> {
+        let (points, names): (Vec<_>, Vec<_>) = named.unzip();
+        self.rec.log_static(
+            self.paths.at(path),
+            &archetypes::Points2D::new(points)
+                .with_labels(names)
+                .with_show_labels(true)
+                .with_colors([rgb(INK)])
+                .with_radii([Radius::new_ui_points(0.0)])
+                .with_draw_order(depth::LEGEND),
+        )?;
+        Ok(())
+    }
+
+    pub(super) fn texts(&self, info: &RunInfo) -> Result<(), RecordError> {
+        // The fence must be longer than any fence inside the text.
+        let mut fence = "```".to_owned();
+        while info.scene_toml.contains(&fence) {
+            fence.push('`');
+        }
+        let scene = format!("{fence}toml\n{}\n{fence}\n", info.scene_toml.trim_end());
+        for (path, text) in [("scene", scene), ("plan", info.plan_markdown.clone())] {
+            self.rec
+                .log_static(self.paths.at(path), &archetypes::TextDocument::from_markdown(text))?;
+        }
+        Ok(())
+    }
+
+    /// Records the names and colours of the curves.
+    pub(super) fn curves(&self, info: &RunInfo) -> Result<(), RecordError> {
+        for plot in &info.plots {
+            for (series, color) in plot.series.iter().zip(OKABE_ITO.iter().cycle()) {
+                let name =
+                    if plot.log10 { format!("log10 {}", series.name) } else { series.name.clone() };
+                self.rec.log_static(
+                    self.paths.curve(&series.path, plot.log10),
+                    &archetypes::SeriesLines::new()
+                        .with_names([name])
+                        .with_colors([rgb(on_dark(*color))])
+                        .with_widths([1.75]),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives all curves of a run one colour, and `name` if given: the plot contains several runs.
+    pub(super) fn one_color(
+        &self,
+        info: &RunInfo,
+        name: Option<&str>,
+        color: [u8; 3],
+    ) -> Result<(), RecordError> {
+        let mut style = archetypes::SeriesLines::update_fields()
+            .with_colors([rgb(on_dark(color))])
+            .with_widths([1.75]);
+        if let Some(name) = name {
+            style = style.with_names([name]);
+        }
+        for plot in &info.plots {
+            for series in &plot.series {
+                self.rec.log_static(self.paths.curve(&series.path, plot.log10), &style)?;
+            }
+        }
+        Ok(())
+    }
+}
