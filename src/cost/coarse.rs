@@ -4,7 +4,7 @@ use super::CostError;
 use super::knobs::cells_near;
 use super::list::Growth;
 use super::measure::{Pilot, Sample, Target, run};
-use super::survey::{ROUNDING, planned};
+use super::planning::{ROUNDING, planned};
 use crate::scene::{Scene, SceneSource};
 
 /// Numbers of cells of the two meshes, relative to that of the scene.

@@ -13,16 +13,19 @@
 
 mod coarse;
 pub mod effects;
+pub mod effort;
 pub mod front;
 pub mod knobs;
 pub mod list;
 pub mod measure;
-pub mod reference;
+pub mod planning;
+mod reference;
 pub mod report;
 mod survey;
 
+pub use effort::Effort;
 pub use list::{Entry, List, Machine};
-pub use survey::{Effort, price};
+pub use survey::price;
 
 use crate::scene::SceneError;
 use crate::sim::SimError;

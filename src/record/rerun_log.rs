@@ -36,9 +36,10 @@ use rerun::archetypes;
 use rerun::components::Color;
 use rerun::{EntityPath, EntityPathPart, RecordingStream};
 
+pub use decode::ReadError;
 pub use mend::{Kept, RepairError, Resumed, repair};
 pub use race::Race;
-pub use read::{ReadError, Recorded, Sample};
+pub use read::{Recorded, Sample};
 pub use side_by_side::{Difference, RecordedRun, SideBySide};
 pub use sinks::{Saved, Sink};
 pub use stage::Lane;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use thiserror::Error;
 
-use super::load::SceneSource;
+use super::source::SceneSource;
 
 /// Largest number of errors reported at once.
 pub(super) const MAX_ERRORS: usize = 8;

@@ -5,7 +5,6 @@ use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -13,6 +12,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{MAX_ERRORS, SceneError, closest, suggestion};
+use super::source::SceneSource;
 use super::types::Scene;
 
 /// The version of the scene format that this program reads.
@@ -22,30 +22,6 @@ pub const SCHEMA: u32 = 1;
 const MAX_BYTES: usize = 1 << 20;
 /// Size of the largest text in which more than the first syntax error is searched for, bytes.
 const MAX_RECOVER: usize = 1 << 16;
-
-/// The text of a scene and the name of its source; cheap to clone.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SceneSource {
-    name: Arc<str>,
-    text: Arc<str>,
-}
-
-impl SceneSource {
-    /// A source with the given name and text.
-    pub fn new(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Self {
-        SceneSource { name: name.into(), text: text.into() }
-    }
-
-    /// The path of the file, or the name of the preset.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// The TOML text.
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-}
 
 /// Reads a scene file without parsing it. Directories and files that are too large, empty or not
 /// UTF-8 are refused.

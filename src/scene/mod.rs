@@ -8,14 +8,17 @@
 pub mod error;
 pub mod expr;
 pub mod load;
+pub mod parameters;
 pub mod presets;
 pub mod quantity;
 pub mod scope;
 pub mod sets;
+pub mod source;
 pub mod types;
 
 pub use error::{Place, SceneError, closest};
-pub use load::{SCHEMA, SceneSource, json_schema, load, parse, scene_hash, to_toml};
+pub use load::{SCHEMA, json_schema, load, parse, scene_hash, to_toml};
 pub use quantity::{Field, FieldFn, Quantity};
 pub use scope::Scope;
+pub use source::SceneSource;
 pub use types::*;

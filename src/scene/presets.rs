@@ -1,7 +1,8 @@
 //! This module contains the preset scenes of the program.
 
 use super::error::{SceneError, suggestion};
-use super::load::{SceneSource, parse};
+use super::load::parse;
+use super::source::SceneSource;
 
 /// Names and TOML texts of the presets.
 const PRESETS: [(&str, &str); 10] = [

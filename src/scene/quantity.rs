@@ -240,7 +240,7 @@ impl<const XY: bool> JsonSchema for Value<XY> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::load::SceneSource;
+    use crate::scene::source::SceneSource;
     use serde::{Deserialize, Serialize};
 
     #[derive(Debug, PartialEq, Serialize, Deserialize)]

@@ -1,52 +1,14 @@
-//! This module evaluates the parameters of a scene.
+//! The values of parameters that expressions may use.
 
 use indexmap::IndexMap;
-
-use super::error::{MAX_ERRORS, SceneError};
-use super::expr;
-use super::types::{Parameter, Scene};
 
 /// Values of the parameters that expressions may use, in the order of the scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scope {
-    values: IndexMap<Box<str>, f64>,
+    pub(super) values: IndexMap<Box<str>, f64>,
 }
 
 impl Scope {
-    /// Evaluates the scene's parameters and checks their names and ranges. A parameter may use the
-    /// parameters above it. Several errors are reported at once.
-    pub fn new(scene: &Scene) -> Result<Scope, SceneError> {
-        Self::with_overrides(scene, |_| None)
-    }
-
-    /// Like [`Scope::new`], but `overrides` gives the values of some parameters (from a schedule or
-    /// a slider). Parameters that depend on them change too.
-    pub fn with_overrides(
-        scene: &Scene,
-        overrides: impl Fn(&str) -> Option<f64>,
-    ) -> Result<Scope, SceneError> {
-        let mut scope = Scope::default();
-        let mut errors = vec![];
-        for (name, parameter) in &scene.parameters {
-            if errors.len() == MAX_ERRORS {
-                break;
-            }
-            let value = check_name(name, parameter)
-                .and_then(|()| scope.parameter(name, parameter, overrides(name)));
-            match value {
-                Ok(value) => _ = scope.values.insert(name.as_str().into(), value),
-                Err(error) => {
-                    errors.push(error);
-                    // Parameters below this one report only their own errors.
-                    let value = parameter.default.eval(&scope).unwrap_or(1.0);
-                    scope.values.insert(name.as_str().into(), value);
-                }
-            }
-        }
-        SceneError::join(errors)?;
-        Ok(scope)
-    }
-
     /// A scope with the given names and values.
     pub fn from_values<'a>(values: impl IntoIterator<Item = (&'a str, f64)>) -> Scope {
         Scope { values: values.into_iter().map(|(name, value)| (name.into(), value)).collect() }
@@ -61,54 +23,4 @@ impl Scope {
     pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
         self.values.iter().map(|(name, value)| (&**name, *value))
     }
-
-    fn parameter(
-        &self,
-        name: &str,
-        parameter: &Parameter,
-        given: Option<f64>,
-    ) -> Result<f64, SceneError> {
-        let written = parameter.value.as_ref().unwrap_or(&parameter.default);
-        let value = match given {
-            Some(value) => value,
-            None => written.eval(self)?,
-        };
-        let bound = |q: &Option<_>| q.as_ref().map(|q: &super::Quantity| q.eval(self)).transpose();
-        let (min, max) = (bound(&parameter.min)?, bound(&parameter.max)?);
-        if let (Some(min), Some(max)) = (min, max)
-            && min > max
-        {
-            let message = format!("parameter `{name}`: its min {min} is above its max {max}");
-            return Err(SceneError::at(&parameter.min, message, "swap them"));
-        }
-        let range = match (min, max) {
-            (Some(min), Some(max)) => format!("{min} to {max}"),
-            (Some(min), None) => format!("{min} or more"),
-            (None, Some(max)) => format!("{max} or less"),
-            (None, None) => "any number".into(),
-        };
-        let inside = min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max);
-        if value.is_finite() && inside {
-            return Ok(value);
-        }
-        let message = format!("parameter `{name}` is {value}, outside its range: {range}");
-        let help = format!("choose `{name}` in the range, or change its `min` or `max`");
-        Err(SceneError::at(written, message, help).with_label("this value"))
-    }
-}
-
-fn check_name(name: &str, parameter: &Parameter) -> Result<(), SceneError> {
-    let fault = if !expr::is_name(name) {
-        "cannot be used in expressions"
-    } else if name == "x" || name == "y" {
-        "is a coordinate"
-    } else if expr::builtin_names().any(|builtin| builtin == name) {
-        "is a function or constant"
-    } else {
-        return Ok(());
-    };
-    let help =
-        "rename it: letters, digits and `_`, not starting with a digit, and no reserved name";
-    let message = format!("parameter `{name}`: this name {fault}");
-    Err(SceneError::at(&parameter.default, message, help).with_label("defined here"))
 }

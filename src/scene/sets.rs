@@ -4,7 +4,8 @@
 use toml_edit::{DocumentMut, InlineTable, Item, Table, Value};
 
 use super::error::{SceneError, suggestion};
-use super::load::{SceneSource, table};
+use super::load::table;
+use super::source::SceneSource;
 
 /// The keys of a scene with which a path may start.
 const KEYS: [&str; 21] = [

@@ -1,6 +1,7 @@
 //! Choosing the time step, by named limiters.
 
 use crate::plan::ClockPlan;
+use crate::space::mesh::Mesh;
 use serde::Serialize;
 
 /// What set the size of a step.
@@ -101,4 +102,27 @@ pub fn next_step(
     } else {
         (dt, name)
     }
+}
+
+/// A particle may cross this many cells that grading made small for one usual cell: their rows
+/// reach across the domain and know nothing of the flow far from what they are for. On the silo,
+/// lips graded by 8, outflow at 0.7 ms was 4.077 in steps of four small cells (half a usual one)
+/// and 4.078 in steps of two, which are half as many again.
+const GRADED_ALLOWANCE: f64 = 8.0;
+
+/// What a unit velocity of each node crosses per unit time, in the smallest of its cells as they
+/// count; nothing where all are solid.
+pub fn crossing_rates(mesh: &Mesh) -> Vec<[f64; 2]> {
+    let usual =
+        [&mesh.x, &mesh.y].map(|axis| (0..axis.cells()).map(|k| axis.size(k)).fold(0.0, f64::max));
+    let mut rates = vec![[0.0_f64; 2]; mesh.nodes()];
+    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let counted = mesh.cell_size(cell).map(|h| h * GRADED_ALLOWANCE);
+        for node in mesh.cell_nodes(cell) {
+            for c in 0..2 {
+                rates[node][c] = rates[node][c].max(1.0 / counted[c].min(usual[c]));
+            }
+        }
+    }
+    rates
 }

@@ -1,6 +1,6 @@
 //! Why a run cannot start or continue, and what the user can do about it.
 
-use super::examine::Fault;
+use super::fault::Fault;
 use super::initial::Unfilled;
 use crate::composition::EmptyCell;
 use crate::solve::report::SolveError;

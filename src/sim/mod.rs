@@ -15,6 +15,7 @@ pub mod clock;
 pub mod criteria;
 mod error;
 mod examine;
+mod fault;
 pub mod guard;
 pub mod initial;
 mod measure;
@@ -30,7 +31,7 @@ pub mod state;
 mod step;
 
 pub use error::SimError;
-pub use examine::{Fault, Place};
+pub use fault::{Fault, Place};
 pub use run::{Run, pressure_at, velocity_at};
 pub use simulation::Simulation;
 

@@ -1,7 +1,7 @@
 //! A run as everything outside of this module sees it: SI units, any number of unknowns.
 
 use super::error::SimError;
-use super::examine::Fault;
+use super::fault::Fault;
 use super::row::Row;
 use super::state::{State, StateError};
 use crate::plan::{Plan, Warning};

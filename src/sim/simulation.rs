@@ -1,9 +1,8 @@
 //! One run at one instant, and its set-up.
 
-use super::clock::Limiter;
+use super::clock::{self, Limiter};
 use super::error::SimError;
 use super::initial;
-use super::measure;
 use super::phases::Phases;
 use super::row::Row;
 use crate::motion::advect::Journeys;
@@ -103,7 +102,7 @@ impl<const D: usize> Simulation<D> {
                 plan.state.materials.len(),
             ),
             currents: Currents::new(&mesh, &plan.enclosure),
-            crossing_rates: measure::crossing_rates(&mesh),
+            crossing_rates: clock::crossing_rates(&mesh),
             journeys: Journeys::default(),
             flow: Flow::zero(&mesh),
             previous: None,

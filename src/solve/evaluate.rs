@@ -3,7 +3,7 @@
 
 use super::element::{PointShape, rates};
 use super::laminate::{self, Cut};
-use super::quadrature::{CutStiffness, IntegrationPoint};
+use super::points::{CutStiffness, IntegrationPoint};
 use crate::composition::interface::Interface;
 use crate::composition::{Content, Gathered, Kind};
 use crate::laws::Here;

@@ -8,6 +8,7 @@ pub mod evaluate;
 pub mod laminate;
 pub mod matrices;
 pub mod multifrontal;
+pub mod points;
 mod problem;
 pub mod quadrature;
 pub mod report;

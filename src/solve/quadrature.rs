@@ -16,7 +16,7 @@
 //! proportional to its volume: the method of the source, for comparison.
 
 use super::evaluate::{CellsMut, Evaluation, LastFlow};
-use super::laminate::VelocityMatrix;
+use super::points::{CutStiffness, IntegrationPoint};
 use crate::composition::{Composition, Content, EmptyCell, Kind, SCRATCH};
 use crate::laws::point::PointLaw;
 use crate::plan::material::Material;
@@ -28,28 +28,6 @@ use crate::threads;
 
 /// Cells that are worth a task of their own.
 const GRAIN: usize = 32;
-
-/// One integration point of a cell.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct IntegrationPoint {
-    /// The law there.
-    pub law: PointLaw,
-    /// Density, of particles as integration points; Gauss points have theirs from `weight`.
-    pub density: f64,
-    /// Share of the cell's volume.
-    pub weight: f64,
-    /// Reference coordinates.
-    pub r: [f64; 2],
-}
-
-/// Viscous stiffness of a cell cut by an interface.
-#[derive(Clone)]
-pub struct CutStiffness {
-    /// On the velocities of the cell's nodes.
-    pub matrix: VelocityMatrix,
-    /// Share of the viscosity that the integration points still have.
-    pub rest: f64,
-}
 
 /// Integration points of all cells, and means that the solver needs.
 pub struct Quadrature {

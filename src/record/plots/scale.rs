@@ -2,7 +2,6 @@
 
 use super::super::number::{engineering_exponent, trim_zeros};
 use super::*;
-use plotters::prelude::*;
 
 /// An axis with its range and ticks, computed from the data.
 pub(super) struct Scale {

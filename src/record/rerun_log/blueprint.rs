@@ -12,7 +12,7 @@ use rerun::external::re_log_types::BlueprintActivationCommand;
 use rerun::external::re_sdk_types::blueprint::{archetypes, components};
 use writer::{Node, Writer, capital};
 
-use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, bar, side_by_side};
+use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, bar};
 use crate::frame::{Rect, RunInfo};
 
 /// Ratio of width to height above which the fields are below the flow instead of beside it.
@@ -32,6 +32,12 @@ fn field_contents(paths: &Paths, name: &str) -> [String; 4] {
         "+ $origin/world/walls".to_owned(),
         "+ $origin/world/gauges".to_owned(),
     ]
+}
+
+/// The bounding rectangle of the domains of all runs (m).
+pub(super) fn bounds(infos: &[&RunInfo]) -> Rect {
+    let domains = infos.iter().map(|info| info.domain);
+    domains.reduce(Rect::around).unwrap_or_default()
 }
 
 /// Sends the layout of a run.
@@ -218,7 +224,7 @@ impl Writer<'_> {
         differences: &[(&RunInfo, Paths)],
         texts: &[(&str, rerun::EntityPath)],
     ) -> Result<Node, RecordError> {
-        let domain = side_by_side::bounds(infos);
+        let domain = bounds(infos);
         let mut above = vec![self.lanes("Flow", infos, domain, &FLOW)?];
         let mut names: Vec<&str> = vec![];
         for field in infos.iter().flat_map(|info| &info.fields) {

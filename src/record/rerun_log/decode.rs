@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 use rerun::external::arrow;
@@ -19,7 +19,36 @@ use rerun::external::re_log_encoding::{
 use rerun::external::re_log_types::ArrowMsg;
 use rerun::log::{Chunk, LogMsg};
 
-use super::read::ReadError;
+/// Error of reading a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file cannot be opened.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Open {
+        /// Path of the file.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The file is not a recording, or it was cut before its first data.
+    #[error("{}: is not a readable recording: {cause}; expected an .rrd file of a run", path.display())]
+    Unreadable {
+        /// Path of the file.
+        path: PathBuf,
+        /// Cause, as reported by the decoder.
+        cause: String,
+    },
+    /// The recording does not contain exactly one run.
+    #[error(
+        "{}: holds {found}; a comparison takes recordings of one run each", path.display()
+    )]
+    NotOneRun {
+        /// Path of the file.
+        path: PathBuf,
+        /// Content of the file.
+        found: String,
+    },
+}
 
 /// The valid messages of a recording, and the reason why its end is missing, if it is.
 pub(super) fn messages(

@@ -13,8 +13,9 @@ use rerun::external::re_log_types::{StoreKind, TimelineName};
 use rerun::log::LogMsg;
 use rerun::sink::LogSink;
 
+use super::decode::ReadError;
 use super::decode::{chunk_of, messages};
-use super::read::{ReadError, below_run};
+use super::read::below_run;
 use super::sinks::{Destinations, RrdFile, Saved, Sink};
 use super::{RecordError, RerunLog, STEP};
 use crate::frame::RunInfo;

@@ -2,46 +2,15 @@
 //! run.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rerun::external::re_log_types::{StoreKind, TimelineName};
 use rerun::log::{Chunk, LogMsg};
 use rerun::{archetypes, components};
 
-use super::decode::{chunk_of, messages};
+use super::decode::{ReadError, chunk_of, messages};
 use super::{RUNS, SIM_TIME, WALL_TIME};
 use crate::frame::{GridField, ParticleSnapshot, Rect};
-
-/// Error of reading a recording.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// The file cannot be opened.
-    #[error("{}: cannot be read: {source}", path.display())]
-    Open {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// The file is not a recording, or it was cut before its first data.
-    #[error("{}: is not a readable recording: {cause}; expected an .rrd file of a run", path.display())]
-    Unreadable {
-        /// Path of the file.
-        path: PathBuf,
-        /// Cause, as reported by the decoder.
-        cause: String,
-    },
-    /// The recording does not contain exactly one run.
-    #[error(
-        "{}: holds {found}; a comparison takes recordings of one run each", path.display()
-    )]
-    NotOneRun {
-        /// Path of the file.
-        path: PathBuf,
-        /// Content of the file.
-        found: String,
-    },
-}
 
 /// One value of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@ use rerun::{EntityPath, EntityPathPart, archetypes};
 
 use super::sinks::{Destinations, Sink};
 use super::{Finished, Paths, RecordError, Recorded, RerunLog, SIM_TIME, blueprint};
-use crate::frame::{GridField, Rect, RunInfo};
+use crate::frame::{GridField, RunInfo};
 use crate::record::color::OKABE_ITO;
 
 /// Delay of the clear after the last difference (s), so that the difference at the end stays
@@ -112,10 +112,4 @@ fn difference_paths(info: &RunInfo) -> Paths {
 
 fn text_path(title: &str) -> EntityPath {
     EntityPath::new(["comparison", title].map(|part| EntityPathPart::new(part.to_owned())).to_vec())
-}
-
-/// The bounding rectangle of the domains of all runs (m).
-pub(super) fn bounds(infos: &[&RunInfo]) -> Rect {
-    let domains = infos.iter().map(|info| info.domain);
-    domains.reduce(Rect::around).unwrap_or_default()
 }

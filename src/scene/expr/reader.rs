@@ -2,7 +2,6 @@
 
 use super::super::error::suggestion;
 use super::*;
-use exmex::Express;
 
 pub(super) const OPERATORS: &str = "operators are + - * / ^ < > <= >= && ||";
 

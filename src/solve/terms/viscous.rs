@@ -15,7 +15,8 @@ use crate::laws::point::{PointLaw, Sym2};
 use crate::laws::rates::Rates;
 use crate::simd::{Simd, dispatch, multiply_add};
 use crate::solve::element::{Gradient, Matrix, Nodal, PointShape, rates};
-use crate::solve::quadrature::{CutStiffness, IntegrationPoint, Quadrature};
+use crate::solve::points::{CutStiffness, IntegrationPoint};
+use crate::solve::quadrature::Quadrature;
 use crate::space::measure::CellMeasure;
 use crate::space::shape::{GAUSS_3_WEIGHTS, NODES, SLOPES_AT_GAUSS, VALUES_AT_GAUSS};
 
