@@ -1,38 +1,45 @@
 //! Steps allocate no memory after the first ones.
 //!
-//! All allocations of this program are counted. Therefore these tests are a separate program and
-//! run one after the other.
+//! The allocations of a test's own thread are counted: `threads::alone` keeps all work of a step on
+//! it. The counting allocator needs a program of its own.
 
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse, presets};
 use grainscope::sim::guard::{Guard, Policy};
 use grainscope::{sim, threads};
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::cell::Cell;
+use std::sync::Arc;
 
 /// The system allocator, with a count of its allocations.
 struct Counting;
 
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// Held while a test counts allocations.
-static ALONE: Mutex<()> = Mutex::new(());
+thread_local! {
+    /// Allocations of this thread. Other threads are not counted: the test harness and the other
+    /// test allocate meanwhile. The value is constant and has no destructor, so that an access
+    /// does not allocate.
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count() {
+    ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+}
 
 // SAFETY: all calls are passed on to the system allocator; the counter does not touch the memory.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        count();
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         unsafe { System.dealloc(pointer, layout) }
     }
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        count();
         unsafe { System.alloc_zeroed(layout) }
     }
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        count();
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
@@ -42,7 +49,6 @@ static COUNTING: Counting = Counting;
 
 /// Allocations of each of `steps` steps after the `first` ones. Steps are checked as by `run`.
 fn allocations(source: SceneSource, sets: &[&str], first: usize, steps: usize) -> Vec<u64> {
-    let _alone = ALONE.lock();
     let sets: Vec<String> = sets.iter().map(|s| s.to_string()).collect();
     let source = source.with_sets(&sets).expect("valid");
     let plan = resolve(&parse(&source).expect("valid")).expect("valid");
@@ -50,9 +56,9 @@ fn allocations(source: SceneSource, sets: &[&str], first: usize, steps: usize) -
     let mut guard = Guard::new(Policy::default(), run.as_ref());
     let mut counts = Vec::with_capacity(first + steps);
     for _ in 0..first + steps {
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = ALLOCATIONS.get();
         guard.step(run.as_mut()).expect("a step");
-        counts.push(ALLOCATIONS.load(Ordering::Relaxed) - before);
+        counts.push(ALLOCATIONS.get() - before);
     }
     counts.split_off(first)
 }

@@ -70,13 +70,15 @@ def silence():
         os.close(kept)
 
 
-def alive(directory):
-    """Whether a server can be reached in this directory."""
-    try:
-        ClientConnection(str(directory))
-        return True
-    except Exception:
-        return False
+def alive(directory, tries=5):
+    """Whether a server can be reached in this directory. A busy machine may need several tries."""
+    for _ in range(tries):
+        try:
+            ClientConnection(str(directory))
+            return True
+        except Exception:
+            time.sleep(ASK)
+    return False
 
 
 def work(directory, cpus):

@@ -294,6 +294,7 @@ impl Drawing for Panels<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::scale::{axis_label, nice_step};
     use super::*;
 
     #[test]

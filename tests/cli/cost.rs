@@ -31,7 +31,9 @@ fn a_cost_table_is_made_stored_and_used() {
     }
     let table = here.read("list/cost.csv");
     let rows = table.lines().count();
-    assert!(rows > 8 && table.starts_with("front,settings,error"), "{table}");
+    // On a busy machine some candidates are left out, and the table says so.
+    let skipped = here.json("list/cost.json")["skipped"].as_array().map_or(0, Vec::len);
+    assert!(rows + skipped > 8 && table.starts_with("front,settings,error"), "{table}");
     let list = here.json("list/cost.json");
     let entries = list["entries"].as_array().expect("entries");
     assert_eq!(entries.len(), rows - 1);

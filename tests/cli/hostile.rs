@@ -7,10 +7,11 @@
 
 use super::killed::{effort, random};
 use super::*;
-use grainscope::compare::open_all;
 use grainscope::record::checkpoint;
 use grainscope::record::rerun_log::{Recorded, repair};
+use grainscope::results::open_all;
 use grainscope::scene::{self, Quantity, SceneSource, Scope};
+use grainscope::session::timed;
 use grainscope::{plan, sim};
 use rand::Rng;
 use rand::seq::IndexedRandom;
@@ -21,19 +22,19 @@ use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Longest time for one input.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Longest processor time for one input, s: other programs do not count.
+const PATIENCE: f64 = 1.0;
+/// Longest time for one input by the clock, s: nothing may hang.
+const LONGEST: f64 = 60.0;
 /// Largest peak memory of all these tests together, kB.
 const MEMORY: u64 = 1_000_000;
 
 /// Tests one input. If it panics or takes too long, the input is written to a file and shown.
 fn try_one(what: &str, number: u64, input: &[u8], test: impl FnOnce()) {
-    let clock = Instant::now();
-    let outcome = catch_unwind(AssertUnwindSafe(test));
-    let took = clock.elapsed();
-    if outcome.is_err() || took > PATIENCE {
+    let (outcome, took) = timed(|| catch_unwind(AssertUnwindSafe(test)));
+    if outcome.is_err() || took.cpu > PATIENCE || took.wall > LONGEST {
         let path = std::env::temp_dir().join(format!("grainscope-hostile-{what}-{number}"));
         std::fs::write(&path, input).expect("written");
         let shown = String::from_utf8_lossy(&input[..input.len().min(2000)]).into_owned();
@@ -395,7 +396,7 @@ fn requests() {
     ];
     let send = |bytes: &[u8]| -> Option<Vec<u8>> {
         let mut stream = TcpStream::connect(address).ok()?;
-        stream.set_read_timeout(Some(Duration::from_secs(5))).ok()?;
+        stream.set_read_timeout(Some(Duration::from_secs_f64(2.0 * LONGEST))).ok()?;
         let _ = stream.write_all(bytes);
         let _ = stream.shutdown(Shutdown::Write);
         let mut answer = Vec::new();

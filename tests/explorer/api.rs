@@ -178,10 +178,9 @@ fn run_pause_step_stop_and_restart() {
     explorer.tell(json!({ "do": "stop" }));
     assert_eq!(explorer.state()["mode"], json!("stopped"));
     assert_eq!(explorer.ask(json!({ "do": "step" }))["accepted"], json!(false));
+    let id = explorer.state()["run"]["id"].clone();
     explorer.tell(json!({ "do": "restart" }));
-    explorer.wait_for("a new run", |s| {
-        s["mode"] == json!("running") && s["run"]["step"].as_u64() < step.as_u64()
-    });
+    explorer.wait_for("a new run", |s| s["run"]["id"] != id && s["mode"] != json!("stopped"));
 }
 
 #[test]
@@ -281,7 +280,7 @@ fn strangers_are_refused() {
     assert_eq!(explorer.state()["mode"], json!("paused"), "a refused command changed the run");
     let long = "x".repeat(1 << 20);
     let refused = code(&state, &[("X-Long", &long)]);
-    assert!(refused == 431 || refused == 400 || refused == 0, "{refused}");
+    assert_eq!(refused, 431);
     assert_eq!(code(&page, &[]), 200, "the server no longer answers");
     let head = request(port, "GET", &page, &[], b"").head.to_ascii_lowercase();
     for header in ["content-security-policy: default-src 'none'", "x-content-type-options: nosniff"]

@@ -284,8 +284,10 @@ fn workspace<const D: usize>(tree: &Tree, f: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::super::element::SKELETON_NODES;
+    use super::super::element::pair;
     use super::*;
     use crate::space::mesh::{Axis, Mesh};
+    use crate::threads;
     use rand::{Rng, SeedableRng};
 
     fn mesh(n: [usize; 2], periodic: [bool; 2]) -> Mesh {
