@@ -98,7 +98,7 @@ fn recording() -> Outcome<()> {
         outcome?;
         step += took.cpu;
         let (sent, took) = timed(|| {
-            let frame = info::frame(&plan, run.row(), 0.0, Some(run.picture()), vec![]);
+            let frame = info::frame(&plan, run.row(), 0.0, Some(run.snapshot()), vec![]);
             logger.send(frame)
         });
         sent.map_err(|_| "the logger ended")?;

@@ -13,8 +13,8 @@ pub struct Frame {
     pub time_s: f64,
     /// Wall-clock time of the computation so far (s).
     pub wall_s: f64,
-    /// Everything drawn in space; `None` keeps the previous picture.
-    pub picture: Option<Picture>,
+    /// Everything drawn in space; `None` keeps the previous snapshot.
+    pub snapshot: Option<Snapshot>,
     /// Values for the plots against time.
     pub scalars: Vec<Scalar>,
     /// Messages for the log, one line each.
@@ -23,7 +23,7 @@ pub struct Frame {
 
 /// Everything drawn in space at one instant. An empty list clears what was drawn before.
 #[derive(Debug, Clone, Default)]
-pub struct Picture {
+pub struct Snapshot {
     /// The particles.
     pub particles: ParticleSnapshot,
     /// Dye lines as polylines (m).

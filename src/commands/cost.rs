@@ -226,7 +226,7 @@ fn race(source: &SceneSource, list: &List, path: &Path) -> Result<(), Failure> {
     let target = Target::of(&parse(&source)?)?;
     let front: Vec<&cost::Entry> = list.front().collect();
     let mut lanes = vec![];
-    for entry in cost::front::spread(&front, LANES) {
+    for entry in cost::pareto::spread(&front, LANES) {
         let source = source.with_sets(&entry.sets)?;
         let (_, plan) = super::resolve(&source)?;
         let accuracy = report::percent(entry.promised);
@@ -251,7 +251,7 @@ fn race(source: &SceneSource, list: &List, path: &Path) -> Result<(), Failure> {
                 step: row.step,
                 time_s: row.time,
                 wall_s: took.wall,
-                picture: shown.then(|| run.picture()),
+                snapshot: shown.then(|| run.snapshot()),
                 scalars: vec![Scalar::new("race/value", target.scalar(plan, row))],
                 warnings: vec![],
             };

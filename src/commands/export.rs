@@ -35,13 +35,17 @@ impl From<ExportError> for Failure {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let film = export::read(&args.run)?;
+    let frames = export::read(&args.run)?;
     let (format, name) = match args.format {
         FormatName::Vtu => (Format::Vtu, "vtu"),
         FormatName::Csv => (Format::Csv, "csv"),
     };
     let beside = if args.run.is_dir() { Some(args.run.as_path()) } else { args.run.parent() };
     let folder = args.out.clone().unwrap_or_else(|| beside.unwrap_or(&args.run).join(name));
-    let files = export::write(&film, format, &folder)?;
-    print(&format!("wrote {files} files of {} frames to {}", film.instants.len(), folder.display()))
+    let files = export::write(&frames, format, &folder)?;
+    print(&format!(
+        "wrote {files} files of {} frames to {}",
+        frames.instants.len(),
+        folder.display()
+    ))
 }

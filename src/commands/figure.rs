@@ -2,11 +2,11 @@
 
 use super::{Failure, compare as comparison, print};
 use crate::compare;
-use crate::frame::Picture;
+use crate::frame::Snapshot;
 use crate::plan::Plan;
+use crate::record::figure_page::{Row, Sheet, sheet};
 use crate::record::number::short;
 use crate::record::rerun_log::Sink;
-use crate::record::sheet::{Row, Sheet, sheet};
 use crate::record::text::duration;
 use crate::record::{folder, info};
 use crate::scene::presets;
@@ -182,11 +182,11 @@ fn cases(figure: &Figure, quick: bool) -> Result<Vec<(String, String, Vec<String
 
 /// Makes all runs, [`AT_ONCE`] in parallel. Returns the frames of each run at the times of the
 /// figure.
-fn run_all(figure: &Figure, jobs: &[Job]) -> Result<Vec<Vec<Picture>>, Failure> {
+fn run_all(figure: &Figure, jobs: &[Job]) -> Result<Vec<Vec<Snapshot>>, Failure> {
     let interrupted = watch_interrupts(super::code::INTERRUPTED);
     let bar = progress_bar((PARTS * jobs.len() as f64) as u64, false);
     let next = AtomicUsize::new(0);
-    let done: Mutex<Vec<Option<Vec<Picture>>>> = Mutex::new(jobs.iter().map(|_| None).collect());
+    let done: Mutex<Vec<Option<Vec<Snapshot>>>> = Mutex::new(jobs.iter().map(|_| None).collect());
     let fault: Mutex<Option<Failure>> = Mutex::new(None);
     std::thread::scope(|scope| {
         for _ in 0..AT_ONCE.min(jobs.len()) {
@@ -230,7 +230,7 @@ fn make(
     job: &Job,
     interrupted: &Interrupted,
     bar: &ProgressBar,
-) -> Result<Vec<Picture>, Failure> {
+) -> Result<Vec<Snapshot>, Failure> {
     let end = job.plan.clock.end * job.plan.units.time;
     let mut pictures = vec![];
     let mut counted = 0;
@@ -241,7 +241,7 @@ fn make(
             let time = run.row().time;
             let due = figure.times.get(pictures.len());
             if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
-                pictures.push(run.picture());
+                pictures.push(run.snapshot());
             }
             let part = (PARTS * time / end) as u64;
             bar.inc(part.saturating_sub(counted));

@@ -1,6 +1,7 @@
 //! This module is the command line, the top layer of the crate. No other module imports it.
 
 mod check;
+mod chosen;
 mod compare;
 mod cost;
 mod cost_page;
@@ -11,7 +12,6 @@ mod figure;
 mod memory;
 mod plan;
 mod presets;
-mod purchase;
 mod repair;
 mod resume;
 mod run;

@@ -1,7 +1,7 @@
 //! This module implements `grainscope run`: it runs a scene and writes a recording, tables and
 //! plots.
 
-use super::purchase;
+use super::chosen;
 use super::{Failure, memory, print};
 use crate::record::folder;
 use crate::record::rerun_log::Sink;
@@ -23,10 +23,10 @@ pub struct Args {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
     /// Use the fastest settings of the `grainscope cost` table that reach this accuracy (1%, 0.003)
-    #[arg(long, value_name = "ERROR", value_parser = purchase::accuracy)]
+    #[arg(long, value_name = "ERROR", value_parser = chosen::accuracy)]
     accuracy: Option<f64>,
     /// Use the most accurate settings that finish within this time (30s, 2min), and stop after it
-    #[arg(long, value_name = "TIME", value_parser = purchase::budget, conflicts_with = "accuracy")]
+    #[arg(long, value_name = "TIME", value_parser = chosen::budget, conflicts_with = "accuracy")]
     budget: Option<f64>,
     /// Folder of the run [default: runs/<scene name>, numbered if taken]
     #[arg(long, value_name = "DIR")]
@@ -95,8 +95,8 @@ impl Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let source = super::source(&args.scene, &args.sets)?;
-    let bought = purchase::buy(&source, args.accuracy, args.budget)?;
-    let source = bought.as_ref().map_or(Ok(source.clone()), |b| source.with_sets(&b.entry.sets))?;
+    let chosen = chosen::choose(&source, args.accuracy, args.budget)?;
+    let source = chosen.as_ref().map_or(Ok(source.clone()), |b| source.with_sets(&b.entry.sets))?;
     let (scene, plan) = match &args.until {
         None => super::resolve(&source)?,
         Some(text) => {
@@ -111,7 +111,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let session = Session::start(&args.options(), &plan, interrupted, || {
         folder::create(&scene.name, args.out.as_deref(), args.force).map_err(Failure::from)
     })?;
-    let budget = bought.map(|b| Box::new(b) as Box<dyn Budget>);
+    let budget = chosen.map(|b| Box::new(b) as Box<dyn Budget>);
     close(session.with_budget(budget).go()?, args.output)
 }
 
@@ -180,7 +180,7 @@ fn report(ended: &Ended, profile: bool) -> String {
         out += &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
     }
     if let Some(p) = &s.purchase {
-        out += &purchase::receipt_text(p);
+        out += &chosen::receipt_text(p);
     }
     let drift = s.volume_drift.values().map(|d| d.abs()).fold(0.0, f64::max);
     out += &format!(

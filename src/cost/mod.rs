@@ -8,16 +8,16 @@
 //! ```
 //! Every candidate is run ([`measure`]). Its error is measured against an exact solution or a
 //! computed reference ([`mod@reference`]). Candidates that no other candidate beats in both error
-//! and time form the Pareto front ([`front`]). [`effects`] measures the time that each effect
+//! and time form the Pareto front ([`pareto`]). [`effects`] measures the time that each effect
 //! takes. [`list`] holds the table that is printed, stored on disk and used to choose settings.
 
 mod coarse;
 pub mod effects;
 pub mod effort;
-pub mod front;
 pub mod knobs;
 pub mod list;
 pub mod measure;
+pub mod pareto;
 pub mod planning;
 mod reference;
 pub mod report;

@@ -1,9 +1,9 @@
 //! This module holds the run of the explorer with its frames, rows and changes.
 
-use super::board::{self, Board};
 use super::draft::{Draft, quantity};
-use super::film::Film;
+use super::frame_buffer::FrameBuffer;
 use super::protocol::Change;
+use super::status::{self, Status};
 use crate::frame::{Frame, RunInfo};
 use crate::plan::{Plan, When};
 use crate::record::info;
@@ -26,7 +26,7 @@ const PICTURE_SHARE: f64 = 0.2;
 const MEAN_OVER: usize = 20;
 
 /// Effect of changing a value.
-pub enum Turn {
+pub enum ChangeEffect {
     /// It takes effect in the run, with this plan and from this step on.
     Live(Box<Plan>, u64),
     /// It needs a new run, for this reason.
@@ -48,7 +48,7 @@ pub struct Live {
     /// Constant part of its recording.
     pub info: RunInfo,
     /// Its frames.
-    pub film: Film,
+    pub frames: FrameBuffer,
     /// Its diagnostics, one row per step.
     pub rows: Vec<Row>,
     /// Changes of the scene during the run.
@@ -63,14 +63,14 @@ pub struct Live {
 
 impl Live {
     /// Starts a run and solves its first instant.
-    pub fn start(id: u64, draft: Draft, plan: Plan, board: &Board) -> Result<Live, SimError> {
+    pub fn start(id: u64, draft: Draft, plan: Plan, status: &Status) -> Result<Live, SimError> {
         let plan = Arc::new(plan);
         let clock = Instant::now();
         let run = sim::start(plan.clone())?;
         let mut warnings = session::warnings(&plan);
         warnings.extend(session::thinned(&plan, run.as_ref()));
         let tally = Tally::new(run.row(), warnings);
-        board.begin(id, board::columns(&plan));
+        status.begin(id, status::columns(&plan));
         let mut info = info::run_info(&plan, &plan.scene.name);
         info.recording_id = format!("{}-{id}", info.recording_id);
         Ok(Live {
@@ -78,7 +78,7 @@ impl Live {
             draft,
             values: Plan::clone(&plan),
             info,
-            film: Film::default(),
+            frames: FrameBuffer::default(),
             rows: vec![],
             changes: vec![],
             computing: clock.elapsed(),
@@ -113,40 +113,40 @@ impl Live {
         Ok(())
     }
 
-    /// Records the present instant. `draw` requests a picture, however recent the last one is.
-    pub fn observe(&mut self, draw: bool, board: &Board) -> Arc<Frame> {
+    /// Records the present instant. `draw` requests a snapshot, however recent the last one is.
+    pub fn observe(&mut self, draw: bool, status: &Status) -> Arc<Frame> {
         let row = self.drive.run.row().clone();
         self.drive.tally.add(&row);
         let mut notes = self.drive.run.events().to_vec();
         notes.append(&mut self.faults);
         let wanted = self.drive.frame_is_due();
         let draw = draw || wanted || self.drive.run.is_finished() || self.picture_is_due();
-        let picture = draw.then(|| self.draw());
-        let frame = Arc::new(self.drive.frame(self.seconds(), picture, notes));
-        self.film.push(frame.clone(), wanted);
-        board.add(self.id, board::point(&self.drive.plan, &row));
+        let snapshot = draw.then(|| self.draw());
+        let frame = Arc::new(self.drive.frame(self.seconds(), snapshot, notes));
+        self.frames.push(frame.clone(), wanted);
+        status.add(self.id, status::point(&self.drive.plan, &row));
         self.rows.push(row);
         frame
     }
 
     /// Adds a picture of the present instant, unless the last frame has one.
     pub fn look(&mut self) -> Option<Arc<Frame>> {
-        if self.film.ends_in_a_picture() {
+        if self.frames.ends_in_a_picture() {
             return None;
         }
-        let picture = self.draw();
+        let snapshot = self.draw();
         let run = self.drive.run.as_ref();
-        let frame = Arc::new(session::picture_alone(run, self.seconds(), picture));
-        self.film.push(frame.clone(), false);
+        let frame = Arc::new(session::snapshot_alone(run, self.seconds(), snapshot));
+        self.frames.push(frame.clone(), false);
         Some(frame)
     }
 
-    fn draw(&mut self) -> crate::frame::Picture {
+    fn draw(&mut self) -> crate::frame::Snapshot {
         let clock = Instant::now();
-        let picture = self.drive.run.picture();
+        let snapshot = self.drive.run.snapshot();
         self.drawing = clock.elapsed();
         self.drawn = Some(Instant::now());
-        picture
+        snapshot
     }
 
     fn picture_is_due(&self) -> bool {
@@ -155,17 +155,17 @@ impl Live {
     }
 
     /// The draft with `key` set to `value`, its plan, and the effect of the change.
-    pub fn turn(&self, key: &str, value: &str) -> Result<(Draft, Plan, Turn), SceneError> {
+    pub fn turn(&self, key: &str, value: &str) -> Result<(Draft, Plan, ChangeEffect), SceneError> {
         let draft = self.draft.with(key, value)?;
         let values = draft.plan()?;
         if let Some(what) = self.values.beyond_matter(&values) {
-            return Ok((draft, values, Turn::Restart(format!("it changes {what}"))));
+            return Ok((draft, values, ChangeEffect::Restart(format!("it changes {what}"))));
         }
         let step = self.drive.run.row().step + 1;
         let set = [(key.trim().to_string(), quantity(value))].into_iter().collect();
         let turn = match self.drive.plan.with_change(self.drive.run.changes_applied(), step, &set) {
-            Ok(plan) => Turn::Live(Box::new(plan), step),
-            Err(e) => Turn::Restart(e.message().to_string()),
+            Ok(plan) => ChangeEffect::Live(Box::new(plan), step),
+            Err(e) => ChangeEffect::Restart(e.message().to_string()),
         };
         Ok((draft, values, turn))
     }

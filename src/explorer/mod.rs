@@ -4,33 +4,33 @@
 //! ```text
 //! page --- commands ---> server --- channel ---> session: takes a step, answers, takes a step
 //!  ^                       |                        |            |
-//!  |<-------- state -------+<------- board ---------+            +--> viewer (recording)
+//!  |<-------- state -------+<------- status ---------+            +--> viewer (recording)
 //! ```
 //!
 //! The `session` owns the run and its data, on a thread of its own. It takes commands between steps
 //! and answers each one: accepted, with the effect, or refused, with the reason. It publishes its
-//! state on the `board`, which the `server` can read at any time, however long a step takes. Pages
+//! state on the `status`, which the `server` can read at any time, however long a step takes. Pages
 //! hold no state: all open pages show the same session.
 
-mod board;
 mod draft;
-mod film;
-mod keep;
+mod frame_buffer;
 mod knobs;
 mod library;
 mod live;
 mod problem;
 mod protocol;
+mod save;
 mod server;
 mod session;
 mod stage;
+mod status;
 
 use crate::record::rerun_log::{ViewerFile, viewer_file};
 use crate::scene::SceneSource;
-use board::Board;
 use crossbeam::channel::bounded;
 use library::Library;
 use session::Session;
+use status::Status;
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -102,8 +102,8 @@ impl Explorer {
         let token = token()?;
         let url = format!("http://{}:{port}/{token}/", Ipv4Addr::LOCALHOST);
         let (sender, receiver) = bounded(WAITING);
-        let board = Arc::new(Board::new());
-        let shared = board.clone();
+        let status = Arc::new(Status::new());
+        let shared = status.clone();
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let session = thread("session")
             .spawn(move || {
@@ -114,7 +114,7 @@ impl Explorer {
                 session.serve();
             })
             .map_err(ExplorerError::Thread)?;
-        let site = server::Site { port, token, commands: sender, board };
+        let site = server::Site { port, token, commands: sender, status };
         thread("server")
             .spawn(move || server::serve(listener, site))
             .map_err(ExplorerError::Thread)?;

@@ -4,9 +4,9 @@
 //! must not be another site. Pages choose scenes and files from lists of the session and never give
 //! paths. The sizes of bodies and headers and the number of connections are limited.
 
-use super::board::Board;
 use super::protocol::{Answer, Command};
 use super::session::Request as Order;
+use super::status::Status;
 use crate::record::rerun_log::{ViewerFile, viewer_file};
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
@@ -58,7 +58,7 @@ pub struct Site {
     /// Sender of commands to the session.
     pub commands: Sender<Order>,
     /// Data that the session publishes.
-    pub board: Arc<Board>,
+    pub status: Arc<Status>,
 }
 
 type Shared = State<Arc<Site>>;
@@ -187,13 +187,13 @@ fn json(text: impl Into<Body>) -> Response {
 }
 
 async fn state(State(site): Shared) -> Response {
-    let text = site.board.watch().borrow().to_string();
+    let text = site.status.watch().borrow().to_string();
     json(text)
 }
 
 /// Streams the state now and after each change, as server-sent events.
 async fn events(State(site): Shared) -> Response {
-    let mut receiver = site.board.watch();
+    let mut receiver = site.status.watch();
     receiver.mark_changed();
     let stream = futures::stream::unfold(receiver, |mut receiver| async move {
         let text = match tokio::time::timeout(HEARTBEAT, receiver.changed()).await {
@@ -213,7 +213,7 @@ async fn curves(State(site): Shared, uri: Uri) -> Response {
         pairs.filter_map(|p| p.split_once('=')).find(|p| p.0 == name)?.1.parse().ok()
     };
     let from = number("from").and_then(|f| usize::try_from(f).ok()).unwrap_or(0);
-    let part = number("run").and_then(|run| site.board.part(run, from));
+    let part = number("run").and_then(|run| site.status.part(run, from));
     match part.map(|p| serde_json::to_string(&p)) {
         Some(Ok(text)) => json(text),
         _ => (StatusCode::NOT_FOUND, "there is no such run\n").into_response(),
@@ -221,7 +221,7 @@ async fn curves(State(site): Shared, uri: Uri) -> Response {
 }
 
 async fn sketch(State(site): Shared) -> Response {
-    match site.board.drawn().map(|s| serde_json::to_string(&s)) {
+    match site.status.drawn().map(|s| serde_json::to_string(&s)) {
         Some(Ok(text)) => json(text),
         _ => (StatusCode::NOT_FOUND, "there is no picture yet\n").into_response(),
     }
@@ -266,7 +266,7 @@ async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Respons
 
 /// A file of a run saved in this session.
 async fn saved(State(site): Shared, Path((folder, file)): Path<(String, String)>) -> Response {
-    let path = site.board.file(&folder, &file);
+    let path = site.status.file(&folder, &file);
     let bytes = path.and_then(|path| std::fs::read(path).ok());
     let Some(bytes) = bytes else {
         return (StatusCode::NOT_FOUND, "there is no such file\n").into_response();

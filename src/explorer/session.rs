@@ -4,13 +4,13 @@
 mod commands;
 mod describe;
 
-use super::board::Board;
 use super::knobs::{self, Knob, Stop, Switch};
 use super::library::Library;
 use super::live::Live;
 use super::problem::Problem;
 use super::protocol::{Answer, Command, Mode, News, SavedState};
 use super::stage::{Pin, Stage};
+use super::status::Status;
 use crate::frame::Frame;
 use crate::plan::Effect;
 use crate::scene::SceneSource;
@@ -54,7 +54,7 @@ pub struct Session {
     library: Library,
     out: PathBuf,
     commands: Receiver<Request>,
-    board: Arc<Board>,
+    status: Arc<Status>,
     interrupted: Arc<AtomicBool>,
     mode: Mode,
     /// Id of the scene in the library.
@@ -87,14 +87,14 @@ impl Session {
         library: Library,
         out: PathBuf,
         commands: Receiver<Request>,
-        board: Arc<Board>,
+        status: Arc<Status>,
         interrupted: Arc<AtomicBool>,
     ) -> Session {
         Session {
             library,
             out,
             commands,
-            board,
+            status,
             interrupted,
             mode: Mode::Empty,
             scene: String::new(),
@@ -231,7 +231,7 @@ impl Session {
         let Some(live) = &mut self.live else { return };
         match live.step() {
             Ok(()) => {
-                let frame = live.observe(self.mode != Mode::Running, &self.board);
+                let frame = live.observe(self.mode != Mode::Running, &self.status);
                 if live.drive.run.is_finished() {
                     self.mode = Mode::Finished;
                     self.tell(true, "the end of the scene is reached");
@@ -262,8 +262,8 @@ impl Session {
     }
 
     fn show(&mut self, frame: &Arc<Frame>) {
-        if let Some(live) = self.live.as_ref().filter(|_| frame.picture.is_some()) {
-            self.board.sketch(&live.info, frame.clone());
+        if let Some(live) = self.live.as_ref().filter(|_| frame.snapshot.is_some()) {
+            self.status.sketch(&live.info, frame.clone());
         }
         if self.stage.as_mut().is_some_and(|stage| !stage.show(frame)) {
             self.set_stage();

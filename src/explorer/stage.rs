@@ -1,6 +1,6 @@
 //! This module streams the run, and pinned runs beside it, to the viewer.
 
-use super::film::Film;
+use super::frame_buffer::FrameBuffer;
 use super::live::Live;
 use super::protocol::{PinState, Stream};
 use crate::frame::{Frame, RunInfo};
@@ -18,7 +18,7 @@ pub struct Pin {
     /// Constant part of its recording.
     pub info: RunInfo,
     /// Its frames.
-    pub film: Film,
+    pub frames: FrameBuffer,
 }
 
 /// A recording that the viewer shows.
@@ -38,8 +38,8 @@ impl Stage {
             info.name = format!("{} (now)", info.name);
         }
         let lanes: Vec<Lane> =
-            pins.iter().map(|p| Lane { info: &p.info, frames: p.film.frames() }).collect();
-        let run = Lane { info: &info, frames: live.film.frames() };
+            pins.iter().map(|p| Lane { info: &p.info, frames: p.frames.frames() }).collect();
+        let run = Lane { info: &info, frames: live.frames.frames() };
         let log = RerunLog::beside(&lanes, &run, &[Sink::Stream])?;
         let url = log.url().unwrap_or_default().to_string();
         let logger = Logger::start(log, Backpressure::DropOldest)

@@ -54,7 +54,7 @@ pub struct Instant {
 
 /// All pictures of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Film {
+pub struct Frames {
     /// Instants in order of time.
     pub instants: Vec<Instant>,
     /// Material names; the class of a particle is an index into them.
@@ -62,40 +62,40 @@ pub struct Film {
 }
 
 /// Reads the pictures of a run from its folder or a recording.
-pub fn read(run: &Path) -> Result<Film, ExportError> {
+pub fn read(run: &Path) -> Result<Frames, ExportError> {
     let member = Member::open(run)?;
     let (Some(recorded), Some(info)) = (&member.recorded, &member.info) else {
         return Err(ExportError::NoRecording(run.to_owned()));
     };
-    let mut film = Film {
+    let mut frames = Frames {
         materials: info.materials.iter().map(|m| m.name.clone()).collect(),
-        ..Film::default()
+        ..Frames::default()
     };
     for (time, particles) in recorded.particles() {
-        film.at(time).particles = Some(particles);
+        frames.at(time).particles = Some(particles);
     }
     let fields: BTreeMap<_, _> = recorded.fields(info.domain);
     for (time, field) in fields.into_values().flatten() {
-        let fields = &mut film.at(time).fields;
+        let fields = &mut frames.at(time).fields;
         let alike = match fields.first() {
             Some(first) => field.on(first.rect(), first.nx, first.ny),
             None => field,
         };
         fields.push(alike);
     }
-    if film.instants.is_empty() {
+    if frames.instants.is_empty() {
         return Err(ExportError::NoPictures(run.to_owned()));
     }
-    Ok(film)
+    Ok(frames)
 }
 
 /// Writes all pictures into a folder. Returns the number of files.
-pub fn write(film: &Film, format: Format, folder: &Path) -> Result<usize, ExportError> {
+pub fn write(frames: &Frames, format: Format, folder: &Path) -> Result<usize, ExportError> {
     std::fs::create_dir_all(folder)
         .map_err(|source| ExportError::Write { path: folder.to_owned(), source })?;
     match format {
-        Format::Vtu => vtu::write(film, folder),
-        Format::Csv => tables::write(film, folder),
+        Format::Vtu => vtu::write(frames, folder),
+        Format::Csv => tables::write(frames, folder),
     }
 }
 
@@ -103,7 +103,7 @@ fn write_file(path: PathBuf, text: impl AsRef<[u8]>) -> Result<(), ExportError> 
     std::fs::write(&path, text).map_err(|source| ExportError::Write { path, source })
 }
 
-impl Film {
+impl Frames {
     /// The instant at a time, created if it does not exist.
     fn at(&mut self, time_s: f64) -> &mut Instant {
         let before = time_s - SAME_TIME * time_s.abs();

@@ -1,32 +1,32 @@
 //! This module writes CSV tables: a row for each particle, and for each sample of the fields.
 
-use super::{ExportError, Film, Instant, write_file};
+use super::{ExportError, Frames, Instant, write_file};
 use std::fmt::Write;
 use std::path::Path;
 
 /// Writes `particles_<n>.csv` and `fields_<n>.csv`, and `frames.csv` with their times. Returns the
 /// number of files.
-pub(super) fn write(film: &Film, folder: &Path) -> Result<usize, ExportError> {
-    let mut frames = String::from("frame,time\n");
+pub(super) fn write(frames: &Frames, folder: &Path) -> Result<usize, ExportError> {
+    let mut table = String::from("frame,time\n");
     let mut files = 1;
-    for (n, instant) in film.instants.iter().enumerate() {
-        let _ = writeln!(frames, "{n},{}", instant.time_s);
-        let both = [("particles", particles(instant, film)), ("fields", fields(instant))];
+    for (n, instant) in frames.instants.iter().enumerate() {
+        let _ = writeln!(table, "{n},{}", instant.time_s);
+        let both = [("particles", particles(instant, frames)), ("fields", fields(instant))];
         for (name, text) in both.into_iter().filter_map(|(name, text)| Some((name, text?))) {
             write_file(folder.join(format!("{name}_{n:05}.csv")), text)?;
             files += 1;
         }
     }
-    write_file(folder.join("frames.csv"), frames)?;
+    write_file(folder.join("frames.csv"), table)?;
     Ok(files)
 }
 
 // Writing to a string cannot fail.
-fn particles(instant: &Instant, film: &Film) -> Option<String> {
+fn particles(instant: &Instant, frames: &Frames) -> Option<String> {
     let particles = instant.particles.as_ref()?;
     let mut text = String::from("x,y,material\n");
     for ([x, y], class) in particles.positions.iter().zip(&particles.class) {
-        let name = film.materials.get(usize::from(*class)).map_or("", String::as_str);
+        let name = frames.materials.get(usize::from(*class)).map_or("", String::as_str);
         let _ = writeln!(text, "{x},{y},{name}");
     }
     Some(text)

@@ -1,7 +1,7 @@
 //! This module writes VTK unstructured grids (XML, binary data in base64), and the `.pvd` index
 //! that ParaView opens.
 
-use super::{ExportError, Film, Instant, write_file};
+use super::{ExportError, Frames, Instant, write_file};
 use crate::frame::{GridField, ParticleSnapshot};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -26,24 +26,25 @@ struct Grid {
 
 /// Writes `particles_<n>.vtu` and `fields_<n>.vtu`, a `.pvd` index with the times for each, and
 /// `materials.csv`. Returns the number of files.
-pub(super) fn write(film: &Film, folder: &Path) -> Result<usize, ExportError> {
+pub(super) fn write(frames: &Frames, folder: &Path) -> Result<usize, ExportError> {
     let particles = |i: &Instant| i.particles.as_ref().map(particles);
     let fields = |i: &Instant| (!i.fields.is_empty()).then(|| fields(&i.fields));
-    let numbered = film.materials.iter().enumerate();
+    let numbered = frames.materials.iter().enumerate();
     let names: String = numbered.map(|(n, name)| format!("{n},{name}\n")).collect();
     write_file(folder.join("materials.csv"), format!("number,name\n{names}"))?;
-    Ok(1 + series(film, folder, "particles", particles)? + series(film, folder, "fields", fields)?)
+    Ok(1 + series(frames, folder, "particles", particles)?
+        + series(frames, folder, "fields", fields)?)
 }
 
 fn series(
-    film: &Film,
+    frames: &Frames,
     folder: &Path,
     name: &str,
     grid: impl Fn(&Instant) -> Option<Grid>,
 ) -> Result<usize, ExportError> {
     let mut sets = String::new();
     let mut files = 0;
-    for (n, instant) in film.instants.iter().enumerate() {
+    for (n, instant) in frames.instants.iter().enumerate() {
         let Some(grid) = grid(instant) else { continue };
         let file = format!("{name}_{n:05}.vtu");
         sets +=

@@ -1,6 +1,6 @@
 //! Moving the particles: position, director, volume.
 
-use super::carrier::{CELL_GRAIN, Carrier};
+use super::frozen_flow::{CELL_GRAIN, FrozenFlow};
 use super::gauges::Counter;
 use crate::plan::EffectSet;
 use crate::space::particles::{GONE, GRAIN, Particles};
@@ -9,7 +9,7 @@ use crate::threads::{self, Divisible};
 
 /// Where all particles come in a step, and what becomes of what they carry: kept from step to step.
 #[derive(Default)]
-pub struct Journeys {
+pub struct Displacements {
     /// Not wrapped around periodic sides.
     to: Vec<[f64; 2]>,
     cell: Vec<u32>,
@@ -20,7 +20,7 @@ pub struct Journeys {
     stretch: Vec<f64>,
 }
 
-impl Journeys {
+impl Displacements {
     /// Makes room; what was there is void.
     fn make_room(&mut self, particles: &Particles, effects: &EffectSet) {
         let n = particles.len();
@@ -78,40 +78,40 @@ impl Divisible for Members<'_> {
 /// Moves all particles through a step. `particles` must be sorted, and are sorted afterwards.
 /// `compliant`: volumes of such a material follow the flow, and its particles keep their mass.
 pub fn advance(
-    carrier: &Carrier,
+    frozen_flow: &FrozenFlow,
     particles: &mut Particles,
-    journeys: &mut Journeys,
+    displacements: &mut Displacements,
     effects: &EffectSet,
     compliant: impl Fn(u8) -> bool + Sync,
     gauges: &mut [Counter],
     count: &mut Count,
 ) {
-    let mesh = carrier.mesh;
-    journeys.make_room(particles, effects);
-    let Journeys { to, cell, held, director, stretch } = &mut *journeys;
+    let mesh = frozen_flow.mesh;
+    displacements.make_room(particles, effects);
+    let Displacements { to, cell, held, director, stretch } = &mut *displacements;
     let members = Members { start: &particles.cell_start, to, cell, held, director, stretch };
     threads::for_parts(members, 0..mesh.cells(), CELL_GRAIN, |cells, members| {
         let first = members.start[0] as usize;
         for home in cells {
             let range = particles.of_cell(home);
-            carrier.travel_all(home, &particles.position[range.clone()], |k, journey| {
+            frozen_flow.travel_all(home, &particles.position[range.clone()], |k, displacement| {
                 let p = range.start + k;
                 let at = p - first;
-                members.held[at] = journey.held;
-                members.to[at] = journey.to;
-                let arrived = || mesh.locate(mesh.wrap(journey.to));
-                let cell = journey.cell.unwrap_or_else(arrived) as u32;
-                members.cell[at] = if journey.left { GONE } else { cell };
+                members.held[at] = displacement.held;
+                members.to[at] = displacement.to;
+                let arrived = || mesh.locate(mesh.wrap(displacement.to));
+                let cell = displacement.cell.unwrap_or_else(arrived) as u32;
+                members.cell[at] = if displacement.left { GONE } else { cell };
                 if members.director.is_empty() && members.stretch.is_empty() {
                     return;
                 }
-                let l = carrier.gradient(journey.middle);
+                let l = frozen_flow.gradient(displacement.middle);
                 if let Some(director) = &particles.director {
-                    members.director[at] = carrier.turn(director[p], &l);
+                    members.director[at] = frozen_flow.turn(director[p], &l);
                 }
                 if let Some(stretch) = members.stretch.get_mut(at) {
                     let follows = compliant(particles.material[p]);
-                    *stretch = if follows { (l.trace() * carrier.dt).exp() } else { 1.0 };
+                    *stretch = if follows { (l.trace() * frozen_flow.dt).exp() } else { 1.0 };
                 }
             });
         }

@@ -1,7 +1,7 @@
 //! What moves with the flow: particles with their history, dye lines, and gauges that count.
 
 pub mod advect;
-pub mod carrier;
-pub mod current;
+pub mod cell_velocity;
+pub mod frozen_flow;
 pub mod gauges;
 pub mod tracers;

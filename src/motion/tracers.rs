@@ -1,6 +1,6 @@
 //! Dye: passive polylines, refined as they stretch so that they stay smooth.
 
-use super::carrier::Carrier;
+use super::frozen_flow::FrozenFlow;
 use crate::plan::Tracers;
 use crate::space::mesh::Mesh;
 
@@ -30,15 +30,16 @@ impl DyeLines {
     }
 
     /// Moves all points through a step, then refines stretched and thins crowded parts.
-    pub fn advance(&mut self, carrier: &Carrier) {
-        let mesh = carrier.mesh;
+    pub fn advance(&mut self, frozen_flow: &FrozenFlow) {
+        let mesh = frozen_flow.mesh;
         for line in &mut self.lines {
             line.retain_mut(|p| {
                 let inside = mesh.wrap(*p);
                 let offset = [p[0] - inside[0], p[1] - inside[1]];
-                let journey = carrier.travel(&carrier.home(mesh.locate(inside)), inside);
-                *p = [journey.to[0] + offset[0], journey.to[1] + offset[1]];
-                !journey.left
+                let displacement =
+                    frozen_flow.travel(&frozen_flow.home(mesh.locate(inside)), inside);
+                *p = [displacement.to[0] + offset[0], displacement.to[1] + offset[1]];
+                !displacement.left
             });
         }
         let mut more = MAX_POINTS.saturating_sub(self.points());

@@ -21,7 +21,7 @@ impl Plan {
             (lines(self) != lines(other), "the gauges or the dye"),
             (self.method != other.method, "the accuracy"),
             (times(self) != times(other), "the times of the run"),
-            (self.picture != other.picture, "the recording"),
+            (self.content != other.content, "the recording"),
         ];
         checks.into_iter().find_map(|(differs, what)| differs.then_some(what))
     }

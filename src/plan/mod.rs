@@ -70,7 +70,7 @@ pub struct Plan {
     /// Settings of the time stepping.
     pub clock: ClockPlan,
     /// Contents of the recording.
-    pub picture: Picture,
+    pub content: FrameContent,
     /// Effects that are solved.
     pub effects: EffectSet,
     /// Warnings about the scene.
@@ -270,7 +270,7 @@ pub struct ClockPlan {
 
 /// Contents and appearance of the recording.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct FrameContent {
     /// Quantity that colours the particles.
     pub colour_by: ColourBy,
     /// Largest number of particles per frame.

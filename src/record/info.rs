@@ -1,7 +1,7 @@
 //! This module derives the constant part of a recording, and the scalars of each step.
 
 use crate::frame::{
-    Frame, Material, Outline, Picture, Plot, Quantity, Rect, RunInfo, Scalar, Series,
+    Frame, Material, Outline, Plot, Quantity, Rect, RunInfo, Scalar, Series, Snapshot,
 };
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName, scene_hash, to_toml};
@@ -50,7 +50,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         .iter()
         .map(|m| m.name.clone())
         .chain((!plan.marks.is_empty()).then(|| MARKED.to_string()))
-        .zip(&plan.picture.colours)
+        .zip(&plan.content.colours)
         .map(|(name, &rgb)| Material { drawn: Some(&name) != undrawn, name, rgb })
         .collect();
     let side = plan.method.seeding.side as f64;
@@ -68,8 +68,8 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
             .collect(),
         materials,
         particle_radius: f(0.5 * sizes(x).min(sizes(y)) / side),
-        particle_quantity: particle_quantity(plan.picture.colour_by),
-        fields: plan.picture.fields.iter().filter_map(|&name| field_quantity(plan, name)).collect(),
+        particle_quantity: particle_quantity(plan.content.colour_by),
+        fields: plan.content.fields.iter().filter_map(|&name| field_quantity(plan, name)).collect(),
         plots: plots(plan),
         scene_toml: to_toml(&plan.scene),
         plan_markdown: super::text::plan_markdown(&plan.describe()),
@@ -131,7 +131,7 @@ pub fn frame(
     plan: &Plan,
     row: &Row,
     wall_s: f64,
-    picture: Option<Picture>,
+    snapshot: Option<Snapshot>,
     warnings: Vec<String>,
 ) -> Frame {
     let recorded = |p: &Place| {
@@ -148,5 +148,5 @@ pub fn frame(
         .map(|p| Scalar::new(p.path.clone(), p.number(row)))
         .collect();
     scalars.extend(row.seconds.list().map(|(name, s)| Scalar::new(format!("seconds/{name}"), s)));
-    Frame { step: row.step, time_s: row.time, wall_s, picture, scalars, warnings }
+    Frame { step: row.step, time_s: row.time, wall_s, snapshot, scalars, warnings }
 }

@@ -1,7 +1,8 @@
 //! This module writes the output of a run: recordings, checkpoints, tables, summaries and plots.
 
 pub mod checkpoint;
-pub mod color;
+pub mod colour;
+pub mod figure_page;
 pub mod folder;
 pub mod info;
 pub mod logger;
@@ -10,6 +11,5 @@ pub mod plots;
 pub mod rerun_log;
 pub mod run_plots;
 pub mod series;
-pub mod sheet;
 pub mod summary;
 pub mod text;

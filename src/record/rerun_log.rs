@@ -17,12 +17,12 @@
 mod pictures;
 mod world;
 
-mod bar;
 mod blueprint;
+mod colour_bar;
 mod decode;
-mod mend;
 mod race;
 mod read;
+mod repair;
 mod side_by_side;
 mod sinks;
 mod stage;
@@ -37,16 +37,16 @@ use rerun::components::Color;
 use rerun::{EntityPath, EntityPathPart, RecordingStream};
 
 pub use decode::ReadError;
-pub use mend::{Kept, RepairError, Resumed, repair};
 pub use race::Race;
 pub use read::{Recorded, Sample};
+pub use repair::{Kept, RepairError, Resumed, repair};
 pub use side_by_side::{Difference, RecordedRun, SideBySide};
 pub use sinks::{Saved, Sink};
 pub use stage::Lane;
 pub use viewer::{ViewerFile, viewer_file};
 
 use crate::frame::{Frame, Quantity, Rect, RunInfo};
-use crate::record::color::ColorScale;
+use crate::record::colour::ColourScale;
 use sinks::{Destinations, Live, Page, RrdFile};
 
 /// Application identifier of all recordings.
@@ -190,7 +190,7 @@ pub struct RerunLog {
     /// Whether the particles were last coloured by a scalar.
     colored: bool,
     /// Colour scales as last recorded, by the entity of the field.
-    scales: HashMap<EntityPath, ColorScale>,
+    scales: HashMap<EntityPath, ColourScale>,
     /// Entities of the isolines drawn last; they are cleared when they are no longer drawn.
     isolines: HashSet<EntityPath>,
     pictures: u64,
@@ -296,8 +296,8 @@ impl RerunLog {
         self.rec.set_time_sequence(STEP, step);
         self.rec.set_duration_secs(WALL_TIME, frame.wall_s);
 
-        if let Some(picture) = &frame.picture {
-            self.picture(picture)?;
+        if let Some(snapshot) = &frame.snapshot {
+            self.snapshot(snapshot)?;
             self.pictures += 1;
         }
         for scalar in &frame.scalars {

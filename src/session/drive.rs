@@ -1,12 +1,12 @@
 //! A run with its guard and the counts for its summary: what every way of driving a run has in common.
 
-use crate::frame::{Frame, Picture};
+use crate::frame::{Frame, Snapshot};
 use crate::plan::{Plan, Warning};
 use crate::record::info;
 use crate::record::summary::Tally;
 use crate::sim::guard::{Guard, Policy};
 use crate::sim::state::State;
-use crate::sim::{Run, SimError, picture};
+use crate::sim::{Run, SimError, snapshot};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -64,19 +64,19 @@ impl Drive {
     }
 
     /// Frame of the current step. `wall`: seconds spent computing so far.
-    pub fn frame(&self, wall: f64, picture: Option<Picture>, mut notes: Vec<String>) -> Frame {
+    pub fn frame(&self, wall: f64, snapshot: Option<Snapshot>, mut notes: Vec<String>) -> Frame {
         let row = self.run.row();
         if row.step == 0 {
             notes.extend(self.tally.warnings.iter().cloned());
         }
-        info::frame(&self.plan, row, wall, picture, notes)
+        info::frame(&self.plan, row, wall, snapshot, notes)
     }
 }
 
 /// Frame of the current state without numbers: one that no row belongs to.
-pub fn picture_alone(run: &dyn Run, wall_s: f64, picture: Picture) -> Frame {
+pub fn snapshot_alone(run: &dyn Run, wall_s: f64, snapshot: Snapshot) -> Frame {
     let (step, time_s) = (run.row().step, run.row().time);
-    Frame { step, time_s, wall_s, picture: Some(picture), ..Frame::default() }
+    Frame { step, time_s, wall_s, snapshot: Some(snapshot), ..Frame::default() }
 }
 
 /// Warnings of a plan.
@@ -86,6 +86,6 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
 
 /// The warning that frames do not show every particle, if that is so.
 pub fn thinned(plan: &Plan, run: &dyn Run) -> Option<String> {
-    let every = picture::thinning(plan, picture::drawn(plan, run.particles()).len());
+    let every = snapshot::thinning(plan, snapshot::drawn(plan, run.particles()).len());
     (every > 1).then(|| Warning::ParticlesThinned { every }.to_string())
 }

@@ -226,7 +226,7 @@ impl Session {
             (&outcome, self.logger.is_some())
         {
             let run = self.drive.run.as_ref();
-            let frame = drive::picture_alone(run, self.wall(), run.picture());
+            let frame = drive::snapshot_alone(run, self.wall(), run.snapshot());
             if let Some(logger) = &mut self.logger {
                 // If the logger has ended, closing it returns the cause.
                 let _ = logger.send(frame);
@@ -307,8 +307,8 @@ impl Session {
             return Ok(());
         }
         let due = self.drive.frame_is_due();
-        let picture = due.then(|| self.drive.run.picture());
-        let frame = self.drive.frame(self.wall(), picture, notes);
+        let snapshot = due.then(|| self.drive.run.snapshot());
+        let frame = self.drive.frame(self.wall(), snapshot, notes);
         self.drive.tally.around.writing += clock.elapsed().as_secs_f64();
         let sent = self.logger.as_mut().map(|logger| logger.send(frame));
         if let Some(Err(_)) = sent { Err(ended_early()) } else { Ok(()) }
@@ -368,7 +368,7 @@ fn start_logger(
     if step > 0 && last_step != Some(step) {
         // The recording ended before this step.
         let wall = run.row().wall;
-        let frame = info::frame(plan, run.row(), wall, Some(run.picture()), vec![]);
+        let frame = info::frame(plan, run.row(), wall, Some(run.snapshot()), vec![]);
         logger.send(frame).map_err(|_| ended_early())?;
     }
     Ok((Some(logger), warnings))

@@ -12,7 +12,7 @@ mod options;
 mod past;
 mod timing;
 
-pub use drive::{Drive, picture_alone, thinned, warnings};
+pub use drive::{Drive, snapshot_alone, thinned, warnings};
 pub use end::Ended;
 pub use error::SessionError;
 pub use files::{Budget, Session};

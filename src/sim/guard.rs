@@ -213,8 +213,8 @@ mod tests {
         fn pressure_at(&self, p: [f64; 2]) -> f64 {
             self.run.pressure_at(p)
         }
-        fn picture(&self) -> frame::Picture {
-            self.run.picture()
+        fn snapshot(&self) -> frame::Snapshot {
+            self.run.snapshot()
         }
         fn state_hash(&self) -> String {
             self.run.state_hash()

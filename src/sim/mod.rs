@@ -20,12 +20,12 @@ pub mod guard;
 pub mod initial;
 mod measure;
 pub mod phases;
-pub mod picture;
 pub mod row;
 mod run;
 mod sampling;
 mod saving;
 mod simulation;
+pub mod snapshot;
 mod solution;
 pub mod state;
 mod step;
@@ -75,7 +75,7 @@ impl<const D: usize> Run for Simulation<D> {
     fn pressure_at(&self, p: [f64; 2]) -> f64 {
         pressure_at(&self.plan, &self.flow, p)
     }
-    fn picture(&self) -> crate::frame::Picture {
+    fn snapshot(&self) -> crate::frame::Snapshot {
         self.draw()
     }
     fn state_hash(&self) -> String {

@@ -25,7 +25,7 @@ pub trait Run: Send {
     /// Pa
     fn pressure_at(&self, p: [f64; 2]) -> f64;
     /// What the recording shows of the current state.
-    fn picture(&self) -> crate::frame::Picture;
+    fn snapshot(&self) -> crate::frame::Snapshot;
     /// SHA-256 over the bits of the particle state.
     fn state_hash(&self) -> String;
     /// Unknowns of the solver: velocity and rotation, pressure.

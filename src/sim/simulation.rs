@@ -5,8 +5,8 @@ use super::error::SimError;
 use super::initial;
 use super::phases::Phases;
 use super::row::Row;
-use crate::motion::advect::Journeys;
-use crate::motion::carrier::Currents;
+use crate::motion::advect::Displacements;
+use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
 use crate::plan::{Matter, Plan};
@@ -34,10 +34,10 @@ pub struct Simulation<const D: usize> {
     /// Those that restoring terms may lie on; none where no scene calls for them.
     pub(super) restoring_faces: Vec<Face>,
     pub(super) particles: Particles,
-    pub(super) currents: Currents,
+    pub(super) velocities: CellVelocities,
     /// Cells that a unit velocity of each node may cross per unit time.
     pub(super) crossing_rates: Vec<[f64; 2]>,
-    pub(super) journeys: Journeys,
+    pub(super) displacements: Displacements,
     pub(super) flow: Flow<D>,
     /// The solution before; none at the start and after a sudden change.
     pub(super) previous: Option<Before<D>>,
@@ -101,9 +101,9 @@ impl<const D: usize> Simulation<D> {
                 Neighbours::new(&mesh, &plan.enclosure),
                 plan.state.materials.len(),
             ),
-            currents: Currents::new(&mesh, &plan.enclosure),
+            velocities: CellVelocities::new(&mesh, &plan.enclosure),
             crossing_rates: clock::crossing_rates(&mesh),
-            journeys: Journeys::default(),
+            displacements: Displacements::default(),
             flow: Flow::zero(&mesh),
             previous: None,
             spare: Flow::zero(&mesh),

@@ -6,7 +6,7 @@ use super::error::SimError;
 use super::phases::Phases;
 use super::simulation::{Before, Simulation};
 use crate::motion::advect;
-use crate::motion::carrier::Carrier;
+use crate::motion::frozen_flow::FrozenFlow;
 use crate::plan::When;
 use crate::space::population::Count;
 use std::time::Instant;
@@ -47,15 +47,15 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let plan = self.plan.clone();
         let parts = self.parts(dt);
-        let Simulation { currents, half, matter, .. } = self;
+        let Simulation { velocities, half, matter, .. } = self;
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = dt / f64::from(parts);
-        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, currents, half, part);
+        let frozen_flow = FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, part);
         for _ in 0..parts {
             advect::advance(
-                &carrier,
+                &frozen_flow,
                 &mut self.particles,
-                &mut self.journeys,
+                &mut self.displacements,
                 &plan.effects,
                 compliant,
                 &mut self.gauges,
@@ -63,7 +63,7 @@ impl<const D: usize> Simulation<D> {
             );
             if let Some(dye) = &mut self.dye {
                 let phase = Instant::now();
-                dye.advance(&carrier);
+                dye.advance(&frozen_flow);
                 seconds.dye += phase.elapsed().as_secs_f64();
             }
         }
@@ -138,16 +138,16 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let mut there = self.particles.clone();
         let parts = self.parts(0.5 * dt);
-        let Simulation { currents, half, matter, journeys, .. } = self;
+        let Simulation { velocities, half, matter, displacements, .. } = self;
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = 0.5 * dt / f64::from(parts);
-        let carrier = Carrier::new(&plan.mesh, &plan.enclosure, currents, half, part);
+        let frozen_flow = FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, part);
         let (effects, no_gauges, mut ignored) = (&plan.effects, &mut [], Count::default());
         for _ in 0..parts {
             advect::advance(
-                &carrier,
+                &frozen_flow,
                 &mut there,
-                journeys,
+                displacements,
                 effects,
                 compliant,
                 no_gauges,

@@ -92,7 +92,7 @@ pub(super) struct Residual<const D: usize> {
     /// `||B' p||^2_{1/D}`, cell by cell.
     pub(super) pressure_norm: f64,
     /// `||W^-1 p||^2`, the divergence that would make such a pressure.
-    pub(super) yielding: f64,
+    pub(super) penalty_norm: f64,
     /// `integral p^2`
     pub(super) pressure_square: f64,
     /// Largest mean viscosity of a cell.

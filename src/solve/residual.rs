@@ -43,7 +43,7 @@ impl<const D: usize> Stokes<D> {
         let shares = &shares[..cells];
         let sums = threads::sum(0..shares.len(), |cell| shares[cell].sums);
         [out.dissipation, out.strain, out.divergence_norm, out.restoring, ..] = sums;
-        [.., out.pressure_norm, out.yielding, out.pressure_square] = sums;
+        [.., out.pressure_norm, out.penalty_norm, out.pressure_square] = sums;
         let cells = (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]);
         out.stiffest = cells.map(|c| quadrature.mean_viscosity[c]).fold(0.0, f64::max);
         out.divergence.clear();
@@ -111,11 +111,11 @@ impl<const D: usize> Stokes<D> {
             }
         }
         let bu = divergence.apply(&u);
-        let [mut yielding, mut pressure_square, mut divergence_norm] = [0.0; 3];
+        let [mut penalty_norm, mut pressure_square, mut divergence_norm] = [0.0; 3];
         for q in 0..3 {
             let rp = bu[q] + compliance * mass[q] * pressure[q];
             let needed = pressure[q] / self.matrices.cells[cell].penalty[q];
-            yielding += needed * needed / mass[q];
+            penalty_norm += needed * needed / mass[q];
             pressure_square += mass[q] * pressure[q] * pressure[q];
             divergence_norm += rp * rp / mass[q];
             share.divergence[q] = rp;
@@ -138,7 +138,8 @@ impl<const D: usize> Stokes<D> {
         }
         share.force = force;
         let [strain, norms] = [internal.strain, divergence_norm];
-        share.sums = [dissipation, strain, norms, taken, pressure_norm, yielding, pressure_square];
+        share.sums =
+            [dissipation, strain, norms, taken, pressure_norm, penalty_norm, pressure_square];
     }
 
     /// Scaled residual, relative divergence, what the penalty makes of the pressure relative to the
@@ -174,7 +175,7 @@ impl<const D: usize> Stokes<D> {
         (
             ratio(rr.sqrt(), scale),
             ratio(r.divergence_norm.sqrt(), strain),
-            ratio(r.yielding.sqrt(), strain),
+            ratio(r.penalty_norm.sqrt(), strain),
             ff + RIGID_POWER * uu + r.pressure_square / stiffest,
         )
     }

@@ -1,7 +1,7 @@
 //! Tests that recordings agree with their runs, and that their errors are reported.
 
 use super::*;
-use grainscope::frame::{Frame, ParticleSnapshot, Picture, Rect, RunInfo, Scalar};
+use grainscope::frame::{Frame, ParticleSnapshot, Rect, RunInfo, Scalar, Snapshot};
 use grainscope::record::rerun_log::{RecordError, RerunLog, Sink};
 use rerun::external::re_chunk_store::{ChunkStore, ChunkStoreConfig};
 use rerun::external::re_log_types::{StoreKind, TimelineName};
@@ -151,7 +151,7 @@ fn frame(step: u64) -> Frame {
         step,
         time_s: step as f64,
         wall_s: step as f64,
-        picture: Some(Picture { particles, ..Default::default() }),
+        snapshot: Some(Snapshot { particles, ..Default::default() }),
         scalars: vec![Scalar::new("diagnostics/power_in", 1.0)],
         warnings: vec![],
     }
@@ -172,9 +172,9 @@ fn the_number_of_particles_may_change() {
     let here = TempFolder::new();
     let path = here.path("x.rrd");
     let mut fewer = frame(1);
-    if let Some(picture) = &mut fewer.picture {
-        picture.particles.positions.truncate(100);
-        picture.particles.class.truncate(100);
+    if let Some(snapshot) = &mut fewer.snapshot {
+        snapshot.particles.positions.truncate(100);
+        snapshot.particles.class.truncate(100);
     }
     record(&path, [frame(0), fewer, frame(2)]).expect("a recording");
     let rows = positions(&recording(&path), "/runs/fake/world/particles");
@@ -185,8 +185,8 @@ fn the_number_of_particles_may_change() {
 fn arrays_of_different_length_are_an_error() {
     let here = TempFolder::new();
     let mut wrong = frame(0);
-    if let Some(picture) = &mut wrong.picture {
-        picture.particles.class.pop();
+    if let Some(snapshot) = &mut wrong.snapshot {
+        snapshot.particles.class.pop();
     }
     let error = record(&here.path("x.rrd"), [wrong]).expect_err("an error").to_string();
     assert!(error.contains("1999") && error.contains("2000"), "{error}");

@@ -216,7 +216,7 @@ fn pictures() {
     let save = |browser: &Browser, name: &str| {
         // Software rendering is slow and lags far behind the run.
         std::thread::sleep(std::time::Duration::from_secs(100));
-        std::fs::write(folder.join(name), browser.picture()).expect("a file");
+        std::fs::write(folder.join(name), browser.snapshot()).expect("a file");
     };
     let cells = ["silo", "--set", "accuracy.cells=4"];
     let scene = "schema = 1\nname = \"broken\"\ngravty = [0, -10]\n";

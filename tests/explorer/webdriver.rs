@@ -196,7 +196,7 @@ impl Browser {
     }
 
     /// Screenshot of the page as PNG.
-    pub fn picture(&self) -> Vec<u8> {
+    pub fn snapshot(&self) -> Vec<u8> {
         decoded(self.command("GET", "/screenshot", json!({})).as_str().unwrap_or_default())
     }
 

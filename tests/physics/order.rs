@@ -1,7 +1,7 @@
 //! Tests that transport and directors are of second order in the time step.
 
 use crate::{finish, preset, scene};
-use grainscope::motion::carrier::{Carrier, Currents};
+use grainscope::motion::frozen_flow::{CellVelocities, FrozenFlow};
 use grainscope::sim::Run;
 use grainscope::space::mesh::{Axis, Mesh};
 use grainscope::space::walls::Enclosure;
@@ -39,18 +39,18 @@ fn points_and_directors_in_a_steady_vortex() {
         .collect();
     let enclosure = Enclosure::default();
     let moved = |steps: u32| {
-        let mut currents = Currents::new(&mesh, &enclosure);
+        let mut velocities = CellVelocities::new(&mesh, &enclosure);
         let dt = 1.0 / f64::from(steps);
-        let carrier = Carrier::new(&mesh, &enclosure, &mut currents, &velocity, dt);
+        let frozen_flow = FrozenFlow::new(&mesh, &enclosure, &mut velocities, &velocity, dt);
         let mut places = Vec::new();
         let mut directors = Vec::new();
         for k in 0..60 {
             let mut p = [0.05 + 0.9 * (f64::from(k) * 0.618).fract(), 0.06 + 0.015 * f64::from(k)];
             let mut n = [f64::from(k).cos(), f64::from(k).sin()];
             for _ in 0..steps {
-                let journey = carrier.travel(&carrier.home(mesh.locate(p)), p);
-                n = carrier.turn(n, &carrier.gradient(journey.middle));
-                p = journey.to;
+                let displacement = frozen_flow.travel(&frozen_flow.home(mesh.locate(p)), p);
+                n = frozen_flow.turn(n, &frozen_flow.gradient(displacement.middle));
+                p = displacement.to;
             }
             places.push(p);
             directors.push(n);
@@ -68,7 +68,7 @@ fn points_and_directors_in_a_steady_vortex() {
 
 /// End points of the dye lines.
 fn ends(run: &dyn Run) -> Vec<[f64; 2]> {
-    let lines = run.picture().dye_lines;
+    let lines = run.snapshot().dye_lines;
     let end = |p: &[f32; 2]| p.map(f64::from);
     lines.iter().flat_map(|l| [end(&l[0]), end(&l[l.len() - 1])]).collect()
 }

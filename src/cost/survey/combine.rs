@@ -1,9 +1,9 @@
 //! Chooses combinations of settings, runs them, and lists what was found.
 
 use super::super::CostError;
-use super::super::front::{self, Offer, Power};
 use super::super::list::{Entry, KnobLine};
 use super::super::measure::Sample;
+use super::super::pareto::{self, Offer, Power};
 use super::super::planning::ROUNDING;
 use super::super::reference::{Kind, Reference};
 use super::*;
@@ -42,7 +42,7 @@ impl Survey<'_> {
             };
             let differences: Vec<(f64, f64)> =
                 measured.iter().filter_map(|&l| Some((size(l), between(at(l)?, best)))).collect();
-            let power = front::fit(size(finest), &differences, k.expected);
+            let power = pareto::fit(size(finest), &differences, k.expected);
             let adds = (0..k.levels.len())
                 .map(|l| {
                     let found = at(l)?;
@@ -88,12 +88,12 @@ impl Survey<'_> {
             offers.push(offer);
             known.push(levels);
         }
-        let proposed: Vec<Vec<usize>> = front::model_front(&offers)
+        let proposed: Vec<Vec<usize>> = pareto::model_front(&offers)
             .into_iter()
             .map(|m| m.iter().enumerate().map(|(k, &i)| known[k][i]).collect::<Vec<_>>())
             .filter(|s| self.ran(s).is_none())
             .collect();
-        for settings in front::spread(&proposed, self.limits.combinations) {
+        for settings in pareto::spread(&proposed, self.limits.combinations) {
             let ratio: f64 = settings
                 .iter()
                 .enumerate()
@@ -173,9 +173,9 @@ impl Survey<'_> {
             })
             .collect();
         let points: Vec<(f64, f64)> = entries.iter().map(|e| (e.promised, e.cpu)).collect();
-        let front = front::front(&points);
+        let front = pareto::front(&points);
         let line: Vec<(f64, f64)> = front.iter().map(|&i| points[i]).collect();
-        for (&i, more) in front.iter().zip(front::next_halving(&line)) {
+        for (&i, more) in front.iter().zip(pareto::next_halving(&line)) {
             entries[i].next_halving = more;
         }
         (knobs, entries, front)

@@ -1,11 +1,11 @@
 //! Commands of the page that change the run, pins and saved runs.
 
 use super::super::draft::Draft;
-use super::super::keep;
 use super::super::knobs::{self};
-use super::super::live::{Live, Turn};
+use super::super::live::{ChangeEffect, Live};
 use super::super::problem::Problem;
 use super::super::protocol::{Answer, Mode, PinState};
+use super::super::save;
 use super::super::stage::{MOST_PINS, Pin};
 use super::*;
 use crate::scene::{SceneError, SceneSource};
@@ -60,18 +60,18 @@ impl Session {
         mode: Mode,
     ) -> Result<(), SceneError> {
         let id = self.number();
-        let live = Live::start(id, draft, plan, &self.board).map_err(|e| {
+        let live = Live::start(id, draft, plan, &self.status).map_err(|e| {
             self.problem = Some(Problem::of_run(&e));
             SceneError::new(e.to_string(), e.remedy())
         })?;
         self.problem = None;
         self.mode = mode;
         if let Some(old) = self.live.replace(live) {
-            self.board.forget(old.id);
+            self.status.forget(old.id);
         }
         let Some(live) = &mut self.live else { return Ok(()) };
-        let frame = live.observe(true, &self.board);
-        self.board.sketch(&live.info, frame);
+        let frame = live.observe(true, &self.status);
+        self.status.sketch(&live.info, frame);
         // The first picture is shown before the knobs are examined.
         self.knobs.clear();
         self.switches.clear();
@@ -115,7 +115,7 @@ impl Session {
         let said = format!("{} = {}", key.trim(), value.trim());
         match live.turn(key, value) {
             Err(e) => Answer::no(e.message(), e.remedy().unwrap_or_default()),
-            Ok((draft, values, Turn::Live(plan, step))) if self.mode.goes_on() => {
+            Ok((draft, values, ChangeEffect::Live(plan, step))) if self.mode.goes_on() => {
                 live.go_on(draft, values, *plan, step);
                 knobs::refresh(&mut self.knobs, &live.values);
                 self.note_values();
@@ -123,8 +123,8 @@ impl Session {
             }
             Ok((draft, values, turn)) => {
                 let why = match turn {
-                    Turn::Restart(why) => why,
-                    Turn::Live(..) => "the run had ended".into(),
+                    ChangeEffect::Restart(why) => why,
+                    ChangeEffect::Live(..) => "the run had ended".into(),
                 };
                 let mode = self.mode_of_next();
                 match self.begin(draft, values, mode) {
@@ -139,11 +139,13 @@ impl Session {
         let Some(live) = &self.live else { return Answer::no("there is no run", "") };
         match live.turn(key, value) {
             Err(e) => Answer::no(e.message(), e.remedy().unwrap_or_default()),
-            Ok((_, _, Turn::Live(_, step))) if self.mode.goes_on() => {
+            Ok((_, _, ChangeEffect::Live(_, step))) if self.mode.goes_on() => {
                 Answer::yes(format!("takes effect with step {step}"))
             }
-            Ok((_, _, Turn::Live(..))) => Answer::yes("starts a new run").restarting(),
-            Ok((_, _, Turn::Restart(why))) => Answer::yes(format!("restarts: {why}")).restarting(),
+            Ok((_, _, ChangeEffect::Live(..))) => Answer::yes("starts a new run").restarting(),
+            Ok((_, _, ChangeEffect::Restart(why))) => {
+                Answer::yes(format!("restarts: {why}")).restarting()
+            }
         }
     }
 
@@ -176,8 +178,8 @@ impl Session {
             time: row.time,
             values,
         };
-        self.board.copy(live.id, id);
-        self.pins.push(Pin { state, info, film: live.film.clone() });
+        self.status.copy(live.id, id);
+        self.pins.push(Pin { state, info, frames: live.frames.clone() });
         self.set_stage();
         Answer::yes(format!("pinned as `{name}`; the next run is shown beside it"))
     }
@@ -187,7 +189,7 @@ impl Session {
             return Answer::no(format!("there is no pin `{name}`"), "");
         };
         let pin = self.pins.remove(at);
-        self.board.forget(pin.state.id);
+        self.status.forget(pin.state.id);
         self.set_stage();
         Answer::yes(format!("unpinned `{name}`"))
     }
@@ -199,11 +201,11 @@ impl Session {
         }
         let Some(live) = &mut self.live else { return Answer::no("there is no run", "") };
         live.look();
-        match keep::keep(live, self.mode, &self.out, name.trim()) {
+        match save::keep(live, self.mode, &self.out, name.trim()) {
             Err(e) => Answer::no(e.to_string(), ""),
             Ok((folder, saved)) => {
                 for (file, _) in &saved.files {
-                    self.board.offer(&saved.name, file, folder.join(file));
+                    self.status.offer(&saved.name, file, folder.join(file));
                 }
                 let message = format!("saved in {}", folder.display());
                 self.saved.insert(0, saved);

@@ -135,7 +135,7 @@ impl Session {
             news: self.news.clone(),
         };
         match serde_json::to_string(&state) {
-            Ok(text) => self.board.publish(text),
+            Ok(text) => self.status.publish(text),
             Err(e) => eprintln!("warning: the state cannot be sent to the page: {e}"),
         }
     }

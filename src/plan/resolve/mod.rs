@@ -165,7 +165,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
             ..accuracy::method(scene)?
         },
         clock: time::clock(scene, scope, &units)?,
-        picture: recording::picture(scene)?,
+        content: recording::content(scene)?,
         effects,
         warnings,
         mesh,

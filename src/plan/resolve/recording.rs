@@ -1,7 +1,7 @@
 //! This module resolves `[recording]`, the contents and colours of frames.
 
 use super::values::Result;
-use crate::plan::Picture;
+use crate::plan::FrameContent;
 use crate::scene::{Scene, SceneError};
 
 /// Okabe-Ito colours, which colour-blind readers can distinguish.
@@ -19,7 +19,7 @@ const BACKGROUND_COLOUR: [u8; 3] = [190, 196, 204];
 const MARK_COLOUR: [u8; 3] = [0, 60, 200];
 
 /// Contents and colours of the frames of the recording.
-pub(super) fn picture(scene: &Scene) -> Result<Picture> {
+pub(super) fn content(scene: &Scene) -> Result<FrameContent> {
     let mut colours = Vec::new();
     let mut free = PALETTE.iter().cycle();
     for (name, m) in &scene.materials {
@@ -36,7 +36,7 @@ pub(super) fn picture(scene: &Scene) -> Result<Picture> {
     }
     colours.push(MARK_COLOUR);
     let r = &scene.recording;
-    Ok(Picture {
+    Ok(FrameContent {
         colour_by: r.colour_by,
         max_particles: r.max_particles as usize,
         fields: r.fields.clone(),

@@ -1,6 +1,6 @@
 //! Draws one panel: frame, axes, legend, curves and bars.
 
-use super::super::color::OKABE_ITO;
+use super::super::colour::OKABE_ITO;
 use super::*;
 use plotters::coord::Shift;
 use plotters::prelude::*;

@@ -12,7 +12,7 @@ use rerun::external::re_log_types::BlueprintActivationCommand;
 use rerun::external::re_sdk_types::blueprint::{archetypes, components};
 use writer::{Node, Writer, capital};
 
-use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, bar};
+use super::{APPLICATION, Paths, RecordError, SIM_TIME, WALL_TIME, colour_bar};
 use crate::frame::{Rect, RunInfo};
 
 /// Ratio of width to height above which the fields are below the flow instead of beside it.
@@ -194,7 +194,7 @@ impl Writer<'_> {
 
     /// The flow of one of several runs, titled with its name.
     fn lane(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {
-        self.space(&info.name, paths, &FLOW, bar::seen(info.domain, bar::Room::Large))
+        self.space(&info.name, paths, &FLOW, colour_bar::seen(info.domain, colour_bar::Room::Large))
     }
 
     /// A column for each run, with their first plot below.
@@ -239,7 +239,7 @@ impl Writer<'_> {
         let mut shares = vec![];
         let mut views = vec![];
         for (info, paths) in differences {
-            let seen = bar::seen(info.domain, bar::Room::Small);
+            let seen = colour_bar::seen(info.domain, colour_bar::Room::Small);
             for field in &info.fields {
                 let title = format!("{}: {}", info.name, field.title());
                 let contents = field_contents(paths, &field.name);
@@ -278,7 +278,7 @@ impl Writer<'_> {
         domain: Rect,
         contents: &[&str],
     ) -> Result<Node, RecordError> {
-        let seen = bar::seen(domain, bar::Room::Large);
+        let seen = colour_bar::seen(domain, colour_bar::Room::Large);
         let views = infos
             .iter()
             .map(|info| self.space(&info.name, &Paths::new(&info.name), contents, seen))
@@ -292,7 +292,7 @@ impl Writer<'_> {
         infos: &[&RunInfo],
         domain: Rect,
     ) -> Result<Node, RecordError> {
-        let seen = bar::seen(domain, bar::Room::Large);
+        let seen = colour_bar::seen(domain, colour_bar::Room::Large);
         let mut views = vec![];
         let mut title = capital(name);
         for info in infos {

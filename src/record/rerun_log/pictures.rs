@@ -1,8 +1,8 @@
 //! Writes what changes from frame to frame: curves, particles, fields, dye and isolines.
 
 use super::*;
-use crate::frame::{GridField, Isoline, ParticleSnapshot, Picture, Scalar};
-use crate::record::color::ColorScale;
+use crate::frame::{GridField, Isoline, ParticleSnapshot, Scalar, Snapshot};
+use crate::record::colour::ColourScale;
 use crate::record::number::short;
 use rerun::archetypes;
 use rerun::components::{Color, MagnificationFilter, Radius};
@@ -36,27 +36,27 @@ impl RerunLog {
         Ok(())
     }
 
-    pub(super) fn picture(&mut self, picture: &Picture) -> Result<(), RecordError> {
-        self.particles(&picture.particles)?;
+    pub(super) fn snapshot(&mut self, snapshot: &Snapshot) -> Result<(), RecordError> {
+        self.particles(&snapshot.particles)?;
         self.rec.log(
             self.paths.at("world/dye"),
-            &archetypes::LineStrips2D::new(picture.dye_lines.iter().map(Vec::as_slice))
+            &archetypes::LineStrips2D::new(snapshot.dye_lines.iter().map(Vec::as_slice))
                 .with_colors([rgb(DYE)])
                 .with_radii([Radius::new_ui_points(1.0)])
                 .with_draw_order(depth::DYE),
         )?;
         self.rec.log(
             self.paths.at("world/directors"),
-            &archetypes::LineStrips2D::new(picture.glyphs.iter().map(<[_; 2]>::as_slice))
+            &archetypes::LineStrips2D::new(snapshot.glyphs.iter().map(<[_; 2]>::as_slice))
                 .with_colors([rgb(GLYPH)])
                 .with_radii([Radius::new_ui_points(1.2)])
                 .with_draw_order(depth::GLYPHS),
         )?;
-        for field in &picture.fields {
+        for field in &snapshot.fields {
             self.field(field)?;
             self.values(field)?;
         }
-        if let Some(arrows) = &picture.arrows {
+        if let Some(arrows) = &snapshot.arrows {
             expect_length("arrows", arrows.vectors.len(), arrows.origins.len())?;
             self.rec.log(
                 self.paths.field(&arrows.field).join(&"arrows".into()),
@@ -67,7 +67,7 @@ impl RerunLog {
                     .with_draw_order(depth::GLYPHS),
             )?;
         }
-        self.lines(&picture.isolines)
+        self.lines(&snapshot.isolines)
     }
 
     pub(super) fn particles(&mut self, particles: &ParticleSnapshot) -> Result<(), RecordError> {
@@ -83,7 +83,7 @@ impl RerunLog {
         if let Some(scalar) = &particles.scalar {
             expect_length("particle values", scalar.values.len(), count)?;
             let signed = self.particle_quantity.as_ref().is_some_and(|q| q.signed);
-            let scale = ColorScale::new(scalar.range, signed);
+            let scale = ColourScale::new(scalar.range, signed);
             points = points.with_colors(scalar.values.iter().map(|&value| {
                 let [r, g, b, a] = scale.color(value);
                 Color::from_unmultiplied_rgba(r, g, b, a)
@@ -101,7 +101,7 @@ impl RerunLog {
     pub(super) fn field(&mut self, field: &GridField) -> Result<(), RecordError> {
         expect_length(&format!("field {}", field.name), field.values.len(), field.nx * field.ny)?;
         let signed = self.quantities.get(&field.name).is_some_and(|quantity| quantity.signed);
-        let scale = ColorScale::new(field.range, signed);
+        let scale = ColourScale::new(field.range, signed);
         let path = self.paths.field(&field.name);
         let [x, y] = field.origin;
         let [dx, dy] = field.cell;
@@ -138,13 +138,13 @@ impl RerunLog {
     pub(super) fn scale_bar(
         &mut self,
         path: &EntityPath,
-        scale: ColorScale,
+        scale: ColourScale,
     ) -> Result<(), RecordError> {
         let last = self.scales.insert(path.clone(), scale);
         if last == Some(scale) {
             return Ok(());
         }
-        let place = bar::place(self.domain);
+        let place = colour_bar::place(self.domain);
         let [width, height] = place.size();
         let [low, high] = scale.ends();
         if last.is_none() {
@@ -152,10 +152,10 @@ impl RerunLog {
             let ramp = (0..STEPS).map(|i| i as f32 / (STEPS - 1) as f32);
             let ramp: Vec<f32> = ramp.collect();
             let colors = if scale.is_signed() {
-                ColorScale::new([-1.0, 1.0], true)
+                ColourScale::new([-1.0, 1.0], true)
                     .image(&ramp.iter().map(|x| 2.0 * x - 1.0).collect::<Vec<_>>())
             } else {
-                ColorScale::new([0.0, 1.0], false).image(&ramp)
+                ColourScale::new([0.0, 1.0], false).image(&ramp)
             };
             self.rec.log_static(
                 path.join(&"bar".into()),

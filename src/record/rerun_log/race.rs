@@ -5,7 +5,7 @@ use std::path::Path;
 use super::sinks::{Destinations, Sink};
 use super::{Finished, RecordError, RerunLog, blueprint};
 use crate::frame::{Frame, RunInfo};
-use crate::record::color::OKABE_ITO;
+use crate::record::colour::OKABE_ITO;
 
 /// A recording of runs that are computed one after the other and viewed together.
 pub struct Race {

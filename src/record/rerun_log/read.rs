@@ -125,7 +125,7 @@ impl Recorded {
         curves
     }
 
-    /// The particles of each picture, with its time (s), in order.
+    /// The particles of each snapshot, with its time (s), in order.
     pub fn particles(&self) -> Vec<(f64, ParticleSnapshot)> {
         let positions = archetypes::Points2D::descriptor_positions().component;
         let classes = archetypes::Points2D::descriptor_class_ids().component;

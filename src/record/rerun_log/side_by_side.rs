@@ -6,7 +6,7 @@ use rerun::{EntityPath, EntityPathPart, archetypes};
 use super::sinks::{Destinations, Sink};
 use super::{Finished, Paths, RecordError, Recorded, RerunLog, SIM_TIME, blueprint};
 use crate::frame::{GridField, RunInfo};
-use crate::record::color::OKABE_ITO;
+use crate::record::colour::OKABE_ITO;
 
 /// Delay of the clear after the last difference (s), so that the difference at the end stays
 /// visible.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::frame::RunInfo;
-use crate::record::color::OKABE_ITO;
+use crate::record::colour::OKABE_ITO;
 use rerun::archetypes;
 use rerun::components::Radius;
 
@@ -70,7 +70,7 @@ impl RerunLog {
         // place.
         let materials: Vec<_> = info.materials.iter().filter(|material| material.drawn).collect();
         if info.particle_quantity.is_none() && materials.len() > 1 {
-            let row = bar::row(info.domain, materials.len());
+            let row = colour_bar::row(info.domain, materials.len());
             let materials = materials.into_iter();
             self.rec.log_static(
                 self.paths.at("world/materials"),

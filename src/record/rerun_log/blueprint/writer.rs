@@ -1,9 +1,9 @@
 //! Writes views and containers of a layout.
 
-use super::super::{Paths, RecordError, bar};
+use super::super::{Paths, RecordError, colour_bar};
 use super::*;
 use crate::frame::{Plot, Rect, RunInfo};
-use crate::record::color::PAPER;
+use crate::record::colour::PAPER;
 use rerun::RecordingStream;
 use rerun::components::Color;
 use rerun::datatypes::{Range1D, Range2D};
@@ -40,7 +40,7 @@ impl Writer<'_> {
             Some(quantity) => format!("Flow: {}", quantity.title()),
             None => "Flow".to_owned(),
         };
-        self.space(&title, paths, &FLOW, bar::seen(info.domain, bar::Room::Large))
+        self.space(&title, paths, &FLOW, colour_bar::seen(info.domain, colour_bar::Room::Large))
     }
 
     pub(super) fn fields(
@@ -48,7 +48,7 @@ impl Writer<'_> {
         info: &RunInfo,
         paths: &Paths,
     ) -> Result<Vec<Node>, RecordError> {
-        let seen = bar::seen(info.domain, bar::Room::Small);
+        let seen = colour_bar::seen(info.domain, colour_bar::Room::Small);
         info.fields
             .iter()
             .map(|field| {

@@ -1,6 +1,6 @@
 //! This module keeps the frames of a run, to show them again.
 
-use crate::frame::{Frame, Picture};
+use crate::frame::{Frame, Snapshot};
 use std::sync::Arc;
 
 /// Maximum memory of the pictures of a run (bytes).
@@ -9,7 +9,7 @@ const BUDGET: usize = 192 << 20;
 /// Frames in order. All scalars are kept. If the pictures exceed the memory limit, every second one
 /// of those not requested by the scene is removed, and then every second one of all.
 #[derive(Clone, Default)]
-pub struct Film {
+pub struct FrameBuffer {
     frames: Vec<Arc<Frame>>,
     /// Whether the scene requested the picture of each frame.
     wanted: Vec<bool>,
@@ -17,8 +17,8 @@ pub struct Film {
     bytes: usize,
 }
 
-impl Film {
-    /// Appends a frame; `wanted` if the scene requested its picture.
+impl FrameBuffer {
+    /// Appends a frame; `wanted` if the scene requested its snapshot.
     pub fn push(&mut self, frame: Arc<Frame>, wanted: bool) {
         self.bytes += size(&frame);
         self.frames.push(frame);
@@ -36,22 +36,22 @@ impl Film {
         &self.frames
     }
 
-    /// Whether the last frame has a picture.
+    /// Whether the last frame has a snapshot.
     pub fn ends_in_a_picture(&self) -> bool {
-        self.frames.last().is_some_and(|f| f.picture.is_some())
+        self.frames.last().is_some_and(|f| f.snapshot.is_some())
     }
 
-    /// Removes every second picture, except the first and the last.
+    /// Removes every second snapshot, except the first and the last.
     fn thin(&mut self, wanted_too: bool) {
         let last = self.frames.len().saturating_sub(1);
         let mut out = true;
         for k in 1..last {
-            if self.frames[k].picture.is_none() || (self.wanted[k] && !wanted_too) {
+            if self.frames[k].snapshot.is_none() || (self.wanted[k] && !wanted_too) {
                 continue;
             }
             out = !out;
             if !out {
-                let frame = Frame { picture: None, ..Frame::clone(&self.frames[k]) };
+                let frame = Frame { snapshot: None, ..Frame::clone(&self.frames[k]) };
                 self.frames[k] = Arc::new(frame);
             }
         }
@@ -61,8 +61,8 @@ impl Film {
 
 /// Approximate size of the picture of a frame (bytes).
 fn size(frame: &Frame) -> usize {
-    let Some(p) = &frame.picture else { return 0 };
-    let Picture { particles, dye_lines, glyphs, fields, arrows, isolines } = p;
+    let Some(p) = &frame.snapshot else { return 0 };
+    let Snapshot { particles, dye_lines, glyphs, fields, arrows, isolines } = p;
     let arrows = arrows.as_ref().map_or(0, |a| 16 * a.origins.len());
     let strips = isolines.iter().flat_map(|i| &i.strips).map(Vec::len).sum::<usize>();
     10 * particles.positions.len()
@@ -81,23 +81,23 @@ mod tests {
 
     #[test]
     fn memory_is_bounded_and_wanted_pictures_stay_longest() {
-        let large = || Picture {
+        let large = || Snapshot {
             particles: ParticleSnapshot {
                 positions: vec![[0.0; 2]; BUDGET / 400],
                 ..Default::default()
             },
             ..Default::default()
         };
-        let mut film = Film::default();
+        let mut frames = FrameBuffer::default();
         for step in 0..120 {
-            let frame = Frame { step, picture: Some(large()), ..Default::default() };
-            film.push(Arc::new(frame), step % 10 == 0);
-            assert!(film.bytes <= BUDGET);
-            assert!(film.ends_in_a_picture());
+            let frame = Frame { step, snapshot: Some(large()), ..Default::default() };
+            frames.push(Arc::new(frame), step % 10 == 0);
+            assert!(frames.bytes <= BUDGET);
+            assert!(frames.ends_in_a_picture());
         }
-        assert_eq!(film.frames().len(), 120);
+        assert_eq!(frames.frames().len(), 120);
         let kept: Vec<u64> =
-            film.frames().iter().filter(|f| f.picture.is_some()).map(|f| f.step).collect();
+            frames.frames().iter().filter(|f| f.snapshot.is_some()).map(|f| f.step).collect();
         assert!(kept.len() > 15 && kept.len() <= 41, "{kept:?}");
         assert!((0..12).all(|k| kept.contains(&(10 * k))), "{kept:?}");
     }

@@ -34,7 +34,7 @@ pub fn budget(text: &str) -> Result<f64, String> {
 }
 
 /// Settings chosen from a cost table.
-pub struct Bought {
+pub struct Chosen {
     /// The chosen entry of the table.
     pub entry: Entry,
     /// The table.
@@ -47,17 +47,17 @@ pub struct Bought {
 
 /// Chooses settings and prints their expected error and time. Returns a failure if no settings
 /// reach the accuracy or the budget, and `None` if neither is given.
-pub fn buy(
+pub fn choose(
     source: &SceneSource,
     accuracy: Option<f64>,
     budget: Option<f64>,
-) -> Result<Option<Bought>, Failure> {
+) -> Result<Option<Chosen>, Failure> {
     if accuracy.is_none() && budget.is_none() {
         return Ok(None);
     }
     let list = cost::to_buy_from(source)?;
-    let pace = pace(source, &list)?;
-    let expected = |e: &Entry| pace * list.expected_seconds(e);
+    let slowdown = slowdown(source, &list)?;
+    let expected = |e: &Entry| slowdown * list.expected_seconds(e);
     let entry = match (accuracy, budget) {
         (Some(wanted), _) => list.for_accuracy(wanted).map_err(|best| {
             let best = best.map_or("the table is empty".into(), |e| {
@@ -74,7 +74,7 @@ pub fn buy(
         }),
         (None, wanted) => {
             let wanted = wanted.unwrap_or(f64::INFINITY);
-            list.for_budget(wanted, pace).map_err(|fastest| {
+            list.for_budget(wanted, slowdown).map_err(|fastest| {
                 let fastest = fastest.map_or("the table is empty".into(), |e| {
                     format!(
                         "the fastest takes about {} for {}: {}",
@@ -97,7 +97,7 @@ pub fn buy(
         list.sampling.map_or(String::new(), |s| format!("; sampling {}", percent(s))),
         seconds(expected(&entry))
     );
-    Ok(Some(Bought { expected: expected(&entry), entry, list, budget }))
+    Ok(Some(Chosen { expected: expected(&entry), entry, list, budget }))
 }
 
 /// Time spent on measuring a few steps, s.
@@ -105,7 +105,7 @@ const PATIENCE: f64 = 0.5;
 
 /// Wall time of a step now, divided by its processor time when the table was made. Other load on
 /// the machine or a lower frequency increase it; more threads decrease it.
-fn pace(source: &SceneSource, list: &List) -> Result<f64, Failure> {
+fn slowdown(source: &SceneSource, list: &List) -> Result<f64, Failure> {
     let Some(entry) = list.front().next() else { return Ok(1.0) };
     let (_, plan) = super::resolve(&source.with_sets(&entry.sets)?)?;
     let now = wall_of_a_step(std::sync::Arc::new(plan), PATIENCE)?;
@@ -118,7 +118,7 @@ fn pace(source: &SceneSource, list: &List) -> Result<f64, Failure> {
 /// Smallest number of steps of an entry for which the time of a step is compared.
 const LEAST_STEPS: u64 = 5;
 
-impl Budget for Bought {
+impl Budget for Chosen {
     /// Whether one more step, as long as the last one, would exceed the budget. The time to close
     /// the files is not counted.
     fn is_spent(&self, clock: &Instant, step: f64) -> bool {

@@ -5,7 +5,7 @@
 
 use super::number::short;
 use super::plots::{Drawing, Drawn, INK, Pen, PlotError, write};
-use crate::frame::{ParticleSnapshot, Picture, Rect, RunInfo};
+use crate::frame::{ParticleSnapshot, Rect, RunInfo, Snapshot};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -56,7 +56,7 @@ pub struct Row {
     /// Constant part of the recording of the run.
     pub info: RunInfo,
     /// Snapshots of the run, one per column.
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<Snapshot>,
 }
 
 /// Writes the sheet to `<stem>.svg` and `<stem>.png`.
@@ -109,9 +109,9 @@ impl Drawing for Sheet {
                 let at = (pen.px(self.side() / 2.0), pen.px(top + height / 2.0));
                 pen.text(root, &row.name, 19.0, at, centre)?;
             }
-            for (k, picture) in row.pictures.iter().take(self.columns.len()).enumerate() {
+            for (k, snapshot) in row.pictures.iter().take(self.columns.len()).enumerate() {
                 let place = [left(k), top, width, height];
-                Snapshot { root, pen, info: &row.info, place }.draw(picture)?;
+                Cell { root, pen, info: &row.info, place }.draw(snapshot)?;
             }
         }
         Ok(())
@@ -119,7 +119,7 @@ impl Drawing for Sheet {
 }
 
 /// A snapshot and the part of the sheet that it fills.
-struct Snapshot<'a, B: DrawingBackend> {
+struct Cell<'a, B: DrawingBackend> {
     root: &'a DrawingArea<B, Shift>,
     pen: Pen,
     info: &'a RunInfo,
@@ -127,29 +127,29 @@ struct Snapshot<'a, B: DrawingBackend> {
     place: [f64; 4],
 }
 
-impl<B: DrawingBackend> Snapshot<'_, B> {
-    fn draw(&self, picture: &Picture) -> Drawn<B> {
+impl<B: DrawingBackend> Cell<'_, B> {
+    fn draw(&self, snapshot: &Snapshot) -> Drawn<B> {
         let marked = |class: u16| {
             self.info.materials.get(usize::from(class)).is_some_and(|m| m.name == "marked")
         };
-        self.area(&picture.particles)?;
-        for [a, b] in &picture.glyphs {
+        self.area(&snapshot.particles)?;
+        for [a, b] in &snapshot.glyphs {
             self.line(&[*a, *b], STROKE, 1.0)?;
         }
-        for line in &picture.dye_lines {
+        for line in &snapshot.dye_lines {
             self.line(line, INK, 0.8)?;
         }
-        for isoline in &picture.isolines {
+        for isoline in &snapshot.isolines {
             for strip in isoline.strips.iter().filter(|strip| self.is_seen(strip)) {
                 self.line(strip, LEVEL, 1.6)?;
             }
         }
-        let particles = picture.particles.positions.iter().zip(&picture.particles.class);
+        let particles = snapshot.particles.positions.iter().zip(&snapshot.particles.class);
         for (position, _) in particles.filter(|(_, class)| marked(**class)) {
             let dot = Circle::new(self.at(*position), self.pen.px(1.7), INK.filled());
             self.root.draw(&dot)?;
         }
-        for isoline in &picture.isolines {
+        for isoline in &snapshot.isolines {
             self.level(isoline.level, &isoline.strips)?;
         }
         for wall in &self.info.walls {

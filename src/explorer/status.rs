@@ -33,7 +33,7 @@ pub struct Part {
 }
 
 /// Data shared between the session and the server.
-pub struct Board {
+pub struct Status {
     state: watch::Sender<Arc<str>>,
     curves: Mutex<HashMap<u64, Curves>>,
     files: Mutex<HashMap<(String, String), PathBuf>>,
@@ -43,7 +43,7 @@ pub struct Board {
 /// Maximum number of particles in a sketch.
 const SKETCH_POINTS: usize = 20_000;
 
-/// A simplified picture, shown until the viewer has loaded.
+/// A simplified snapshot, shown until the viewer has loaded.
 #[derive(Debug, Serialize)]
 pub struct Sketch {
     /// Number of the step.
@@ -58,10 +58,10 @@ pub struct Sketch {
     pub grains: Vec<([u8; 3], Vec<[f32; 2]>)>,
 }
 
-impl Board {
-    /// An empty board.
-    pub fn new() -> Board {
-        Board {
+impl Status {
+    /// An empty status.
+    pub fn new() -> Status {
+        Status {
             state: watch::Sender::new("null".into()),
             curves: Mutex::default(),
             files: Mutex::default(),
@@ -113,16 +113,16 @@ impl Board {
         lock(&self.curves).remove(&run);
     }
 
-    /// Keeps the last picture, from which the sketch is made.
+    /// Keeps the last snapshot, from which the sketch is made.
     pub fn sketch(&self, info: &RunInfo, frame: Arc<Frame>) {
         *lock(&self.sketch) = Some((info.clone(), frame));
     }
 
-    /// The sketch of the last picture; `None` if there is no picture.
+    /// The sketch of the last snapshot; `None` if there is no snapshot.
     pub fn drawn(&self) -> Option<Sketch> {
         let (info, frame) = lock(&self.sketch).clone()?;
-        let picture = frame.picture.as_ref()?;
-        let particles = &picture.particles;
+        let snapshot = frame.snapshot.as_ref()?;
+        let particles = &snapshot.particles;
         let every = particles.positions.len().div_ceil(SKETCH_POINTS).max(1);
         let mut grains: Vec<_> = info.materials.iter().map(|m| (m.rgb, vec![])).collect();
         let both = particles.positions.iter().zip(&particles.class).step_by(every);
@@ -135,7 +135,7 @@ impl Board {
             step: frame.step,
             domain: [info.domain.min, info.domain.max],
             walls: info.walls.into_iter().map(|w| w.points).collect(),
-            dye: picture.dye_lines.clone(),
+            dye: snapshot.dye_lines.clone(),
             grains,
         })
     }

@@ -1,6 +1,6 @@
 //! Transport of points through the velocity of the half step: second order in time.
 
-use super::current::{Current, Points, TOGETHER, ways};
+use super::cell_velocity::{CellVelocity, Points, TOGETHER, trace_points};
 use crate::laws::director;
 use crate::simd::Simd;
 use crate::space::mesh::{Axis, INSIDE, Mesh, Span};
@@ -12,17 +12,17 @@ use nalgebra::Matrix2;
 pub const CELL_GRAIN: usize = 64;
 
 /// What carries points, cell by cell: kept from step to step.
-pub struct Currents {
-    cells: Vec<Current>,
+pub struct CellVelocities {
+    cells: Vec<CellVelocity>,
     /// Between a point of the cell and one of the up to nine around it there is never a wall, a side
     /// of the domain or a seam.
     free: Vec<bool>,
 }
 
-impl Currents {
+impl CellVelocities {
     pub fn new(mesh: &Mesh, enclosure: &Enclosure) -> Self {
         let free = (0..mesh.cells()).map(|cell| is_free(mesh, enclosure, cell)).collect();
-        Currents { cells: vec![Current::default(); mesh.cells()], free }
+        CellVelocities { cells: vec![CellVelocity::default(); mesh.cells()], free }
     }
 }
 
@@ -42,18 +42,18 @@ fn is_free(mesh: &Mesh, enclosure: &Enclosure, cell: usize) -> bool {
 }
 
 /// A velocity field frozen at the middle of a step, and the walls in it.
-pub struct Carrier<'a> {
+pub struct FrozenFlow<'a> {
     pub mesh: &'a Mesh,
     pub enclosure: &'a Enclosure,
     pub dt: f64,
     /// Of every cell, at the middle of the step.
-    currents: &'a [Current],
+    velocities: &'a [CellVelocity],
     free: &'a [bool],
     simd: Simd,
 }
 
 /// Where a point goes in a step.
-pub struct Journey {
+pub struct Displacement {
     /// End of the step, not wrapped around periodic sides.
     pub to: [f64; 2],
     /// It left the domain through an open side.
@@ -67,7 +67,7 @@ pub struct Journey {
 }
 
 /// The cell that points start from.
-pub struct Home {
+pub struct StartCell {
     cell: usize,
     /// That cell, and those on either side of it, by direction; these only where it is free.
     spans: [[Span; 3]; 2],
@@ -76,7 +76,7 @@ pub struct Home {
     free: bool,
 }
 
-impl Home {
+impl StartCell {
     fn reference(&self, p: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|c| self.spans[c][1].reference(p[c]))
     }
@@ -107,32 +107,32 @@ impl Home {
     }
 }
 
-impl<'a> Carrier<'a> {
+impl<'a> FrozenFlow<'a> {
     /// `velocity`: at the nodes, of the middle of the step.
     pub fn new(
         mesh: &'a Mesh,
         enclosure: &'a Enclosure,
-        currents: &'a mut Currents,
+        velocities: &'a mut CellVelocities,
         velocity: &[[f64; 2]],
         dt: f64,
     ) -> Self {
-        threads::for_each(&mut currents.cells, CELL_GRAIN, |cell, current| {
+        threads::for_each(&mut velocities.cells, CELL_GRAIN, |cell, current| {
             let nodal = mesh.cell_nodes(cell).map(|n| velocity[n]);
-            *current = Current::new(&nodal, mesh.cell_size(cell));
+            *current = CellVelocity::new(&nodal, mesh.cell_size(cell));
         });
-        let Currents { cells, free } = currents;
-        Carrier { mesh, enclosure, dt, currents: cells, free, simd: Simd::used() }
+        let CellVelocities { cells, free } = velocities;
+        FrozenFlow { mesh, enclosure, dt, velocities: cells, free, simd: Simd::used() }
     }
 
     /// A cell to start from.
-    pub fn home(&self, cell: usize) -> Home {
+    pub fn home(&self, cell: usize) -> StartCell {
         let (i, j) = self.mesh.cell_ij(cell);
         let free = self.free[cell];
         let spans = |axis: &Axis, k: usize| {
             let near = |k: usize| if free { axis.span(k) } else { Span::default() };
             [near(k.wrapping_sub(1)), axis.span(k), near(k + 1)]
         };
-        Home {
+        StartCell {
             cell,
             spans: [spans(&self.mesh.x, i), spans(&self.mesh.y, j)],
             stride: [1, self.mesh.x.cells()],
@@ -144,7 +144,7 @@ impl<'a> Carrier<'a> {
     /// is; where the way leaves the domain, that of the start.
     fn stage(
         &self,
-        home: &Home,
+        home: &StartCell,
         p: [f64; 2],
         u: [f64; 2],
         dt: f64,
@@ -159,30 +159,30 @@ impl<'a> Carrier<'a> {
             let cell = mesh.locate(place);
             (cell, mesh.to_reference(cell, place))
         });
-        (self.currents[cell].at(r), (cell, r))
+        (self.velocities[cell].at(r), (cell, r))
     }
 
     /// The classical fourth-order Runge-Kutta rule from `p` in its cell. The field is frozen at the
     /// middle of the step, so the order in time is that of the field; the high order in space
     /// keeps the distances of particles: a midpoint rule changes areas by `(dt |grad u|)^4 / 4`
     /// a step, this one by `(dt |grad u|)^6 / 72`.
-    pub fn travel(&self, home: &Home, p: [f64; 2]) -> Journey {
+    pub fn travel(&self, home: &StartCell, p: [f64; 2]) -> Displacement {
         let dt = self.dt;
-        let k1 = self.currents[home.cell].at(home.reference(p));
+        let k1 = self.velocities[home.cell].at(home.reference(p));
         let (k2, _) = self.stage(home, p, k1, 0.5 * dt);
         let (k3, middle) = self.stage(home, p, k2, 0.5 * dt);
         let (k4, _) = self.stage(home, p, k3, dt);
         let mean = |c: usize| (k1[c] + 2.0 * (k2[c] + k3[c]) + k4[c]) / 6.0;
         let goal = [p[0] + dt * mean(0), p[1] + dt * mean(1)];
         if let Some((cell, _)) = home.near(goal) {
-            return Journey { to: goal, left: false, held: false, middle, cell: Some(cell) };
+            return Displacement { to: goal, left: false, held: false, middle, cell: Some(cell) };
         }
         let (to, left, held) = match self.enclosure.follow(self.mesh, p, goal) {
             Landing::Free(q) => (q, false, false),
             Landing::Held(q) => (q, false, true),
             Landing::Left => (goal, true, false),
         };
-        Journey { to, left, held, middle, cell: None }
+        Displacement { to, left, held, middle, cell: None }
     }
 
     /// The ways of the points of one cell: those that stay inside it together, the others one by one.
@@ -190,7 +190,7 @@ impl<'a> Carrier<'a> {
         &self,
         cell: usize,
         from: &[[f64; 2]],
-        mut arrive: impl FnMut(usize, Journey),
+        mut arrive: impl FnMut(usize, Displacement),
     ) {
         if from.is_empty() {
             return;
@@ -202,23 +202,23 @@ impl<'a> Carrier<'a> {
                 [r[0][k], r[1][k]] = home.reference(*p);
             }
             let step = home.spans.map(|[_, own, _]| dt * own.per_length);
-            let ways = ways(self.simd, &self.currents[cell], &r, step);
+            let ways = trace_points(self.simd, &self.velocities[cell], &r, step);
             for (k, &p) in points.iter().enumerate() {
-                let journey = if ways.inside[k] {
+                let displacement = if ways.inside[k] {
                     let to = [0, 1].map(|c| p[c] + dt * ways.velocity[c][k]);
                     let middle = (cell, [ways.middle[0][k], ways.middle[1][k]]);
-                    Journey { to, left: false, held: false, middle, cell: Some(cell) }
+                    Displacement { to, left: false, held: false, middle, cell: Some(cell) }
                 } else {
                     self.travel(&home, p)
                 };
-                arrive(TOGETHER * at + k, journey);
+                arrive(TOGETHER * at + k, displacement);
             }
         }
     }
 
-    /// Velocity gradient at the middle of a journey.
+    /// Velocity gradient at the middle of a displacement.
     pub fn gradient(&self, (cell, r): (usize, [f64; 2])) -> Matrix2<f64> {
-        self.currents[cell].gradient(r, self.mesh.cell_size(cell))
+        self.velocities[cell].gradient(r, self.mesh.cell_size(cell))
     }
 
     /// A director after the step under a velocity gradient.

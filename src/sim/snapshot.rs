@@ -3,7 +3,7 @@
 mod raster;
 
 use super::simulation::Simulation;
-use crate::frame::{Arrows, GridField, ParticleScalar, ParticleSnapshot, Picture};
+use crate::frame::{Arrows, GridField, ParticleScalar, ParticleSnapshot, Snapshot};
 use crate::laws::director;
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName};
@@ -25,7 +25,7 @@ const ALIGNMENT_LEVELS: [f32; 6] = [0.6, 0.5, 0.4, 0.3, 0.2, 0.1];
 
 /// Every how many particles one is drawn.
 pub fn thinning(plan: &Plan, drawn: usize) -> usize {
-    drawn.div_ceil(plan.picture.max_particles.max(1)).max(1)
+    drawn.div_ceil(plan.content.max_particles.max(1)).max(1)
 }
 
 /// Particles that are drawn: all but the background's.
@@ -35,16 +35,16 @@ pub fn drawn(plan: &Plan, particles: &Particles) -> Vec<usize> {
 }
 
 impl<const D: usize> Simulation<D> {
-    pub(super) fn draw(&self) -> Picture {
+    pub(super) fn draw(&self) -> Snapshot {
         let plan = &self.plan;
         let fields: Vec<GridField> =
-            plan.picture.fields.iter().filter_map(|&f| self.field(f)).collect();
+            plan.content.fields.iter().filter_map(|&f| self.field(f)).collect();
         let isolines = fields
             .iter()
             .filter(|f| f.name == "alignment")
             .flat_map(|f| ALIGNMENT_LEVELS.iter().map(|&level| isoline(f, level)))
             .collect();
-        Picture {
+        Snapshot {
             particles: self.draw_particles(),
             dye_lines: self.dye.as_ref().map_or(vec![], |d| {
                 let si = |p: &[f64; 2]| plan.si(*p).map(|c| c as f32);
@@ -80,7 +80,7 @@ impl<const D: usize> Simulation<D> {
     fn particle_scalar(&self, shown: &[usize]) -> Option<ParticleScalar> {
         let u = &self.plan.units;
         let mesh = &self.plan.mesh;
-        let colour_by = self.plan.picture.colour_by;
+        let colour_by = self.plan.content.colour_by;
         let value = |p: usize| -> f64 {
             let x = self.particles.position[p];
             let cell = mesh.locate(x);
@@ -245,7 +245,7 @@ impl<const D: usize> Simulation<D> {
         let Some(directors) = &self.particles.director else { return vec![] };
         let plan = &self.plan;
         let longer = plan.mesh.x.length().max(plan.mesh.y.length());
-        let count = f64::from(plan.picture.glyphs) * longer / plan.mesh.x.length();
+        let count = f64::from(plan.content.glyphs) * longer / plan.mesh.x.length();
         if count < 1.0 {
             return vec![];
         }

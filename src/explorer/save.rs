@@ -16,7 +16,7 @@ const MAX_NAME: usize = 64;
 
 /// Error of saving a run.
 #[derive(Debug, thiserror::Error)]
-pub enum KeepError {
+pub enum SaveError {
     /// The name is not a valid folder name.
     #[error("{0:?} is not a valid folder name: use 1 to 64 letters, digits, `_` and `-`")]
     Name(String),
@@ -43,10 +43,10 @@ pub enum KeepError {
 }
 
 /// Checks that a name is a plain folder name, which cannot lead out of the parent folder.
-pub fn checked(name: &str) -> Result<&str, KeepError> {
+pub fn checked(name: &str) -> Result<&str, SaveError> {
     let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(ordinary) {
-        return Err(KeepError::Name(name.chars().take(MAX_NAME).collect()));
+        return Err(SaveError::Name(name.chars().take(MAX_NAME).collect()));
     }
     Ok(name)
 }
@@ -57,18 +57,18 @@ pub fn keep(
     mode: Mode,
     out: &Path,
     name: &str,
-) -> Result<(PathBuf, SavedState), KeepError> {
+) -> Result<(PathBuf, SavedState), SaveError> {
     let folder = folder::create_below(out, checked(name)?)?;
     let at = |name: &str| folder.join(name);
     let write = |name: &str, text: String| {
         let path = at(name);
-        std::fs::write(&path, text).map_err(|source| KeepError::Write { path, source })
+        std::fs::write(&path, text).map_err(|source| SaveError::Write { path, source })
     };
     write("scene.toml", to_toml(&live.drive.plan.scene))?;
     let table = at("series.csv");
     SeriesWriter::create(&table, &live.drive.plan)
         .and_then(|mut series| live.rows.iter().try_for_each(|row| series.write(row)))
-        .map_err(|source| KeepError::Write { path: table, source })?;
+        .map_err(|source| SaveError::Write { path: table, source })?;
     let recording = at("recording.rrd");
     let folder_name = folder.file_name().map(|n| n.to_string_lossy().into_owned());
     let mut info = live.info.clone();
@@ -76,7 +76,7 @@ pub fn keep(
     // The schedule has changed since the start of the run.
     info.scene_toml = to_toml(&live.drive.plan.scene);
     let mut log = RerunLog::open(&info, &[Sink::Save(recording.clone())])?;
-    live.film.frames().iter().try_for_each(|frame| log.frame(frame))?;
+    live.frames.frames().iter().try_for_each(|frame| log.frame(frame))?;
     log.finish()?;
     let mut tally = Tally { wall: live.seconds(), ..live.drive.tally.clone() };
     tally.warnings.extend(live.drive.run.warnings().iter().map(ToString::to_string));
@@ -92,7 +92,7 @@ pub fn keep(
         folder.display().to_string(),
         Some(recording.display().to_string()),
     );
-    summary.write(&folder).map_err(KeepError::Summary)?;
+    summary.write(&folder).map_err(SaveError::Summary)?;
     plots_of_run(&folder, &live.drive.plan, &live.rows)?;
     let files = folder::FILES.iter().filter_map(|name| {
         let size = std::fs::metadata(at(name)).ok()?.len();

@@ -36,18 +36,18 @@ type Coefficients = [[f64; 4]; 3];
 
 /// Velocity in one cell, as polynomials of its reference coordinates.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Current {
+pub struct CellVelocity {
     u: Coefficients,
     v: Coefficients,
 }
 
-impl Current {
+impl CellVelocity {
     /// From the velocities at the nodes of a cell of size `[hx, hy]`.
     pub fn new(nodal: &[[f64; 2]; NODES], [hx, hy]: [f64; 2]) -> Self {
         let u = biquadratic(|along, across| nodal[3 * across + along][0] * 0.5 * hy);
         let v = biquadratic(|along, across| nodal[3 * along + across][1] * 0.5 * hx);
         let ratio = (hx / hy).powi(2);
-        Current {
+        CellVelocity {
             u: scaled(&corrected(&u, &v, ratio), 2.0 / hy),
             v: scaled(&corrected(&v, &u, 1.0 / ratio), 2.0 / hx),
         }
@@ -89,12 +89,12 @@ pub struct Ways {
 dispatch! {
     /// The classical Runge-Kutta rule for points at the reference coordinates `r`; `step`: reference
     /// coordinates that a unit velocity crosses in the step.
-    pub fn ways(current: &Current, r: &Points, step: [f64; 2]) -> Ways = ways_kernel
+    pub fn trace_points(current: &CellVelocity, r: &Points, step: [f64; 2]) -> Ways = ways_kernel
 }
 
 #[inline(always)]
 fn ways_kernel<const LENGTH: usize, const FMA: bool>(
-    current: &Current,
+    current: &CellVelocity,
     r: &Points,
     step: [f64; 2],
 ) -> Ways {
@@ -137,7 +137,7 @@ fn stage<const FMA: bool>(
     at
 }
 
-impl Current {
+impl CellVelocity {
     #[inline(always)]
     fn at_all<const FMA: bool>(&self, r: &Points) -> Points {
         [values::<FMA>(&self.u, &r[0], &r[1]), values::<FMA>(&self.v, &r[1], &r[0])]
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn the_divergence_left_is_what_the_pressure_sees() {
         let nodal = arbitrary();
-        let current = Current::new(&nodal, SIZE);
+        let current = CellVelocity::new(&nodal, SIZE);
         let mut seen = [0.0; 3];
         for g in GAUSS_3X3.iter() {
             let div = gradient(&nodal, &g.shape, SIZE).trace();
@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn normal_velocities_on_edges_are_those_of_the_nodes() {
         let nodal = arbitrary();
-        let current = Current::new(&nodal, SIZE);
+        let current = CellVelocity::new(&nodal, SIZE);
         for t in [-1.0, -0.6, 0.1, 0.8] {
             for edge in [-1.0, 1.0] {
                 for (r, c) in [([edge, t], 0), ([t, edge], 1)] {
@@ -284,7 +284,7 @@ mod tests {
 
     #[test]
     fn gradients_are_those_of_the_values() {
-        let current = Current::new(&arbitrary(), SIZE);
+        let current = CellVelocity::new(&arbitrary(), SIZE);
         let (r, d) = ([0.37, -0.52], 1e-5);
         let l = current.gradient(r, SIZE);
         for c in 0..2 {
@@ -306,7 +306,7 @@ mod tests {
             [2.0 * x * x * y - 6.0 * y * y + x, -(2.0 * x * y * y + 3.0 * x * x + y)]
         };
         let nodal = sampled(f, [0.4, -0.3]);
-        let current = Current::new(&nodal, SIZE);
+        let current = CellVelocity::new(&nodal, SIZE);
         for r in [[0.0, 0.0], [0.3, -0.8], [-0.95, 0.4]] {
             let expected = interpolate(&nodal, &Shape::values(r));
             let got = current.at(r);
@@ -316,12 +316,12 @@ mod tests {
 
     #[test]
     fn points_together_go_the_ways_of_single_points() {
-        let current = Current::new(&arbitrary(), SIZE);
+        let current = CellVelocity::new(&arbitrary(), SIZE);
         let places: Points =
             std::array::from_fn(|c| std::array::from_fn(|p| 0.9 * ((3 * p + 5 * c) as f64).sin()));
         let step = [0.02, 0.03];
         for simd in crate::simd::all() {
-            let ways = ways(simd, &current, &places, step);
+            let ways = trace_points(simd, &current, &places, step);
             for p in 0..TOGETHER {
                 let r = [places[0][p], places[1][p]];
                 let stage = |k: [f64; 2], share: f64| {
@@ -339,7 +339,7 @@ mod tests {
                 }
                 assert!(ways.inside[p]);
             }
-            let out = super::ways(simd, &current, &places, [3.0, 3.0]);
+            let out = super::trace_points(simd, &current, &places, [3.0, 3.0]);
             assert!(out.inside.contains(&false));
         }
     }

@@ -83,13 +83,13 @@ const BLUE_WHITE_RUST: [[u8; 3]; 17] = [
 
 /// Colour scale: maps values to colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ColorScale {
+pub struct ColourScale {
     low: f32,
     high: f32,
     signed: bool,
 }
 
-impl ColorScale {
+impl ColourScale {
     /// A scale over `range`; if `signed`, a scale symmetric about zero that contains `range`.
     pub fn new(range: [f32; 2], signed: bool) -> Self {
         let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
@@ -167,11 +167,11 @@ mod tests {
 
     #[test]
     fn ends_middle_and_nan() {
-        let plain = ColorScale::new([2.0, 4.0], false);
+        let plain = ColourScale::new([2.0, 4.0], false);
         assert_eq!(plain.color(2.0), [68, 1, 84, 255]);
         assert_eq!(plain.color(9.0), [253, 231, 37, 255]);
         assert_eq!(plain.color(f32::NAN), NOTHING);
-        let signed = ColorScale::new([-1.0, 3.0], true);
+        let signed = ColourScale::new([-1.0, 3.0], true);
         assert_eq!(signed.ends(), [-3.0, 3.0]);
         assert_eq!(signed.color(0.0), [247, 247, 247, 255]);
     }
@@ -180,7 +180,7 @@ mod tests {
     fn empty_and_infinite_ranges_have_a_colour() {
         for range in [[0.0, 0.0], [f32::NAN, 1.0], [f32::INFINITY, 0.0]] {
             for signed in [false, true] {
-                assert_eq!(ColorScale::new(range, signed).color(0.5)[3], 255);
+                assert_eq!(ColourScale::new(range, signed).color(0.5)[3], 255);
             }
         }
     }
