@@ -3,12 +3,12 @@
 //! that is named but switched off must take no time: its ratio to a scene that never named it is 1
 //! within noise. The ratio of a scene to itself shows the noise.
 
-use grainscope::cost::effects::{Pair, pair, without};
+use grainscope::internals::info;
+use grainscope::internals::timed;
+use grainscope::internals::{Backpressure, Logger};
+use grainscope::internals::{Pair, pair, without};
+use grainscope::internals::{RerunLog, Sink};
 use grainscope::plan::{EffectKind, Plan};
-use grainscope::record::info;
-use grainscope::record::logger::{Backpressure, Logger};
-use grainscope::record::rerun_log::{RerunLog, Sink};
-use grainscope::session::timed;
 use grainscope::{plan, scene, sim};
 use std::error::Error;
 use std::sync::Arc;

@@ -35,28 +35,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod cases;
+pub(crate) mod cases;
 pub mod commands;
-pub mod compare;
-pub mod composition;
-pub mod cost;
-pub mod explorer;
-pub mod export;
+pub(crate) mod compare;
+pub(crate) mod composition;
+pub(crate) mod cost;
+pub(crate) mod explorer;
+pub(crate) mod export;
 pub mod frame;
+pub mod internals;
 pub mod laws;
-pub mod motion;
+pub(crate) mod motion;
 pub mod plan;
-pub mod record;
-pub mod results;
+pub(crate) mod record;
+pub(crate) mod results;
 pub mod scene;
-pub mod session;
+pub(crate) mod session;
 pub mod sim;
-pub mod simd;
-pub mod solve;
-pub mod space;
-pub mod stress;
-pub mod sweep;
-#[doc(hidden)]
-pub mod testing;
+pub(crate) mod simd;
+pub(crate) mod solve;
+pub(crate) mod space;
+pub(crate) mod stress;
+pub(crate) mod sweep;
+pub(crate) mod testing;
 pub mod threads;
-pub mod verify;
+pub(crate) mod verify;

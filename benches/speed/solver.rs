@@ -3,10 +3,10 @@
 
 use super::faer_llt::FaerLlt;
 use super::{Outcome, least, on_threads};
-use grainscope::solve::element::{CellBlocks, SKELETON_NODES, pair};
-use grainscope::solve::multifrontal::Multifrontal;
-use grainscope::solve::multifrontal::tree::Tree;
-use grainscope::space::mesh::{Axis, Mesh};
+use grainscope::internals::Multifrontal;
+use grainscope::internals::Tree;
+use grainscope::internals::{Axis, Mesh};
+use grainscope::internals::{CellBlocks, SKELETON_NODES, node_pair as pair};
 use rand::{Rng, SeedableRng};
 use std::collections::BTreeMap;
 use std::fmt::Write;

@@ -3,8 +3,8 @@
 
 use super::machine::Machine;
 use super::{Outcome, exponent, on_threads};
+use grainscope::internals::Effort;
 use grainscope::sim::phases::Phases;
-use grainscope::solve::multifrontal::Effort;
 use grainscope::{plan, scene, sim};
 use std::fmt::Write;
 use std::sync::Arc;

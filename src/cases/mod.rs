@@ -17,7 +17,7 @@ mod vortex;
 pub use cosserat::{Fluid, couette, coupled_cell, poiseuille};
 pub use inclined::{Inclined, inclined_pure_shear, inclined_shear};
 pub use layers::{Wave, layer_stack, layered_cell};
-pub use measure::{CaseError, Errors, Fields, plan_of, start};
+pub use measure::{CaseError, Errors, plan_of, start};
 pub use of_scene::exact_of;
 pub use small::Small;
 pub use solcx::{Drive, SolCx, solcx};

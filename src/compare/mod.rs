@@ -10,8 +10,8 @@ mod scenes;
 mod tolerance;
 mod view;
 
-pub use report::{markdown, terminal};
-pub use tolerance::{Amount, Tolerance, Verdict};
+pub use report::terminal;
+pub use tolerance::{Tolerance, Verdict};
 pub use view::{plots, record};
 
 use crate::results::{Kind, Member, ResultsError, later, table};

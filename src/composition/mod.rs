@@ -8,7 +8,7 @@ pub mod features;
 mod gather;
 pub mod interface;
 
-pub use gather::{Gathered, Neighbourhood, SCRATCH};
+pub use gather::{Gathered, SCRATCH};
 
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;

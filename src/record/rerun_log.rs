@@ -39,7 +39,7 @@ use rerun::{EntityPath, EntityPathPart, RecordingStream};
 pub use decode::ReadError;
 pub use race::Race;
 pub use read::{Recorded, Sample};
-pub use repair::{Kept, RepairError, Resumed, repair};
+pub use repair::repair;
 pub use side_by_side::{Difference, RecordedRun, SideBySide};
 pub use sinks::{Saved, Sink};
 pub use stage::Lane;

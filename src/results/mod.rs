@@ -4,7 +4,6 @@ mod member;
 pub mod table;
 
 pub use member::{Kind, Member, ResultsError, open_all};
-pub use table::Table;
 
 /// Relative difference below which times are equal.
 pub const SAME_TIME: f64 = 1e-9;

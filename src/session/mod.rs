@@ -17,5 +17,5 @@ pub use end::Ended;
 pub use error::SessionError;
 pub use files::{Budget, Session};
 pub use interrupts::{Interrupted, progress_bar, tell, wait_for_interrupt, watch_interrupts};
-pub use options::{OnFault, Options, Recording, Safety};
+pub use options::{Options, Recording, Safety};
 pub use timing::{Took, march, thread_seconds, timed};

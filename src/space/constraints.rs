@@ -67,17 +67,6 @@ impl<const D: usize> Constraints<D> {
         }
     }
 
-    /// Sets the forces on prescribed components to zero.
-    pub fn clear_fixed(&self, force: &mut [[f64; D]]) {
-        for (f, fixed) in force.iter_mut().zip(&self.fixed) {
-            for c in 0..D {
-                if fixed[c] {
-                    f[c] = 0.0;
-                }
-            }
-        }
-    }
-
     /// Subtracts the mean velocity along free translations, and the mean pressure if it is
     /// determined only up to a constant.
     pub fn remove_null_space(&self, mesh: &Mesh, flow: &mut Flow<D>) {

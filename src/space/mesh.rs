@@ -282,24 +282,4 @@ impl Mesh {
             .flatten()
             .flat_map(move |j| x.into_iter().flatten().map(move |i| self.cell(i, j)))
     }
-    /// Neighbours of a cell across faces, including periodic neighbours; at most four.
-    pub fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
-        let (i, j) = self.cell_ij(cell);
-        let step = |axis: &Axis, k: usize, up: bool| match (up, axis.periodic) {
-            (true, _) if k + 1 < axis.cells() => Some(k + 1),
-            (true, true) => Some(0),
-            (false, _) if k > 0 => Some(k - 1),
-            (false, true) => Some(axis.cells() - 1),
-            _ => None,
-        };
-        [false, true]
-            .into_iter()
-            .flat_map(move |up| {
-                [
-                    step(&self.x, i, up).map(|i| self.cell(i, j)),
-                    step(&self.y, j, up).map(|j| self.cell(i, j)),
-                ]
-            })
-            .flatten()
-    }
 }

@@ -32,11 +32,6 @@ pub struct Face {
     pub cells: [u32; 2],
     /// Direction of the normal: 0 for x (vertical face), 1 for y (horizontal face).
     pub normal: usize,
-    /// Coordinate of the face along its normal for each of its two cells; the two values differ
-    /// where a periodic axis is joined.
-    pub at: [f64; 2],
-    /// Coordinate of the midpoint along the face.
-    pub middle: f64,
 }
 
 /// All faces between cells that carry no wall.
@@ -61,7 +56,7 @@ pub fn open_faces(mesh: &Mesh, enclosure: &Enclosure) -> Vec<Face> {
                 o.normal == normal && at.contains(&o.at) && middle > o.from && middle < o.to
             });
             if !walled && !mesh.solid[other] {
-                faces.push(Face { cells: [cell as u32, other as u32], normal, at, middle });
+                faces.push(Face { cells: [cell as u32, other as u32], normal });
             }
         }
     }

@@ -17,8 +17,8 @@ pub use hq::HyperQueue;
 pub use list::{Case, List};
 pub use local::{Limits, Local};
 pub use spec::{PlotSpec, Spec, preset_list, preset_source, read_file, similar};
-pub use store::{Attempt, State, Store};
-pub use vary::{Sample, values_of};
+pub use store::{State, Store};
+pub use vary::Sample;
 
 use crate::scene::SceneError;
 use crate::simd::{self, Simd};

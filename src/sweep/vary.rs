@@ -128,11 +128,6 @@ pub(super) fn read(text: &str, scope: &Scope) -> Result<Vary, SweepError> {
     Ok(Vary { name, values: Values::List(list) })
 }
 
-/// The values of a `--vary` as written, if it is a plain list such as `alpha=0,1/3`.
-pub fn values_of(vary: &str) -> Vec<&str> {
-    vary.split_once('=').map(|(_, values)| split(values)).unwrap_or_default()
-}
-
 enum Item {
     /// A single value, used as it is written.
     One,

@@ -103,7 +103,7 @@ fn the_page_lists_every_preset_and_every_knob() {
     for (name, _) in preset_files() {
         assert!(page.contains(&format!("| {name} | ")), "{name} is missing in docs/cost.md");
     }
-    for (name, keys, _) in grainscope::cost::knobs::KNOBS {
+    for (name, keys, _) in grainscope::internals::KNOBS {
         assert!(page.contains(&format!("| {name} | `{keys}` |")), "{name} is missing");
     }
 }

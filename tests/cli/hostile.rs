@@ -7,11 +7,11 @@
 
 use super::killed::{effort, random};
 use super::*;
-use grainscope::record::checkpoint;
-use grainscope::record::rerun_log::{Recorded, repair};
-use grainscope::results::open_all;
+use grainscope::internals::checkpoint;
+use grainscope::internals::open_all;
+use grainscope::internals::timed;
+use grainscope::internals::{Recorded, repair};
 use grainscope::scene::{self, Quantity, SceneSource, Scope};
-use grainscope::session::timed;
 use grainscope::{plan, sim};
 use rand::Rng;
 use rand::seq::IndexedRandom;

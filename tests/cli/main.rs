@@ -19,11 +19,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 /// A temporary folder, deleted at the end of the test.
-struct TempFolder(grainscope::testing::TempFolder);
+struct TempFolder(grainscope::internals::TempFolder);
 
 impl TempFolder {
     fn new() -> Self {
-        TempFolder(grainscope::testing::TempFolder::new().expect("a temporary folder"))
+        TempFolder(grainscope::internals::TempFolder::new().expect("a temporary folder"))
     }
 
     fn path(&self, name: &str) -> PathBuf {

@@ -2,7 +2,7 @@
 
 use super::*;
 use grainscope::frame::{Frame, ParticleSnapshot, Rect, RunInfo, Scalar, Snapshot};
-use grainscope::record::rerun_log::{RecordError, RerunLog, Sink};
+use grainscope::internals::{RecordError, RerunLog, Sink};
 use rerun::external::re_chunk_store::{ChunkStore, ChunkStoreConfig};
 use rerun::external::re_log_types::{StoreKind, TimelineName};
 use std::collections::{BTreeMap, BTreeSet};

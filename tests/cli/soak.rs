@@ -1,7 +1,7 @@
 //! Long test (`.ci/run --long`): memory does not grow over 20,000 steps.
 
 use super::*;
-use grainscope::record::plots::{Axis, Curve, PlotSpec, line_plot};
+use grainscope::internals::{Curve, PlotAxis as Axis, PlotSpec, line_plot};
 use std::process::Stdio;
 use std::time::Duration;
 

@@ -5,7 +5,7 @@ mod browser;
 mod http;
 mod webdriver;
 
-use grainscope::testing::TempFolder;
+use grainscope::internals::TempFolder;
 use http::Reply;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};

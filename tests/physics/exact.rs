@@ -1,6 +1,6 @@
 //! Compares Cosserat Couette and Poiseuille flow and the coupled cell with their exact solutions.
 
-use grainscope::cases::{Case, Fluid, couette, coupled_cell, poiseuille};
+use grainscope::internals::{Case, Fluid, couette, coupled_cell, poiseuille};
 
 /// Fluid of all cases.
 const FLUID: Fluid = Fluid { shear: 1.0, coupling: 1.0, internal_length: 0.3 };

@@ -1,10 +1,10 @@
 //! Tests that transport and directors are of second order in the time step.
 
 use crate::{finish, preset, scene};
-use grainscope::motion::frozen_flow::{CellVelocities, FrozenFlow};
+use grainscope::internals::Enclosure;
+use grainscope::internals::{Axis, Mesh};
+use grainscope::internals::{CellVelocities, FrozenFlow};
 use grainscope::sim::Run;
-use grainscope::space::mesh::{Axis, Mesh};
-use grainscope::space::walls::Enclosure;
 use std::f64::consts::PI;
 
 /// Smallest order between neighbouring errors; prints all orders.

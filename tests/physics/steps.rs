@@ -1,7 +1,7 @@
 //! Tests large time steps of stable stratified fluids, and growth rates of unstable ones.
 
 use crate::scene;
-use grainscope::cases::rayleigh_taylor::{Undulation, growth_ratio};
+use grainscope::internals::{Undulation, growth_ratio};
 use grainscope::sim::Run;
 
 /// A heavy fluid below a light one in a unit box, with a cosine-shaped interface.

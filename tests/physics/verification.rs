@@ -1,6 +1,6 @@
 //! Runs the quick version of `grainscope verify`, and compares results with docs/verification.md.
 
-use grainscope::verify::{Effort, SUBJECTS, run};
+use grainscope::internals::{SUBJECTS, VerifyEffort as Effort, verify as run};
 
 /// Checks that all checks of a subject pass.
 fn check(name: &str) {
