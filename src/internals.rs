@@ -15,6 +15,7 @@ pub use crate::session::timed;
 pub use crate::solve::element::{CellBlocks, SKELETON_NODES, pair as node_pair};
 pub use crate::solve::multifrontal::tree::Tree;
 pub use crate::solve::multifrontal::{Effort, Multifrontal};
+pub use crate::space::measure::Measure;
 pub use crate::space::mesh::{Axis, Mesh};
 pub use crate::space::walls::Enclosure;
 pub use crate::testing::TempFolder;

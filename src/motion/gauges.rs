@@ -80,7 +80,7 @@ impl Counter {
                 let p = mesh.from_reference(owner, r);
                 let upstream = if u > 0.0 { low } else { high }.unwrap_or(owner);
                 let share = fraction(mesh, particles, upstream, p, g.material, background);
-                flux += g.sign * share * u * along.size(k) / SAMPLES as f64;
+                flux += g.sign * share * u * mesh.face_area(owner, normal) / SAMPLES as f64;
             }
         }
         flux

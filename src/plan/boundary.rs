@@ -1,10 +1,13 @@
 //! This module turns the boundary conditions of a scene into constraints.
 
-use super::Units;
-use crate::scene::FieldFn;
+use super::resolve::values::{Result, edge, finite_range};
+use super::resolve::walls::Walls;
+use super::{Matter, Units};
+use crate::scene::{BoundaryKind, Field, FieldFn, Scene, SceneError, Scope, WallKind};
 use crate::space::constraints::Constraints;
 use crate::space::mesh::Mesh;
 use crate::space::segment::Segment;
+use crate::space::shape::side_normal;
 
 /// Boundary conditions at a side of the domain, as functions of SI coordinates.
 #[derive(Clone, Debug, Default)]
@@ -45,11 +48,6 @@ pub struct BoundaryPlan {
 
 /// Names of the sides, in the order of [`BoundaryPlan::sides`].
 pub const SIDES: [&str; 4] = ["left", "right", "bottom", "top"];
-
-/// Direction of the normal of a side: 0 for x, 1 for y.
-pub fn side_normal(side: usize) -> usize {
-    side / 2
-}
 
 /// Mesh nodes on a side.
 fn side_nodes(mesh: &Mesh, side: usize) -> Vec<usize> {
@@ -138,4 +136,107 @@ impl BoundaryPlan {
         }
         (net, total)
     }
+}
+
+/// Boundary conditions at the four sides of the domain.
+pub(super) fn sides(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<[Side; 4]> {
+    let mut out: [Side; 4] = Default::default();
+    for (s, side) in scene.boundaries.sides().into_iter().enumerate() {
+        let name = format!("boundaries.{}", SIDES[s]);
+        let normal = side_normal(s);
+        let velocity = [&side.velocity_x, &side.velocity_y];
+        let traction = [&side.traction_x, &side.traction_y];
+        if side.kind == BoundaryKind::Periodic {
+            if let Some(f) =
+                velocity.into_iter().chain(traction).chain([&side.rotation]).flatten().next()
+            {
+                return Err(SceneError::at(
+                    f,
+                    format!("{name} is periodic and prescribes a value"),
+                    "a periodic side has no boundary: remove the value or the kind",
+                ));
+            }
+            out[s].periodic = true;
+            continue;
+        }
+        let compile = |f: &Field| -> Result<FieldFn> {
+            let compiled = f.compile(scope)?;
+            finite_range(f, &compiled, edge(domain, s), &name)?;
+            Ok(compiled)
+        };
+        for c in 0..2 {
+            let held = match side.kind {
+                BoundaryKind::NoSlip => true,
+                BoundaryKind::FreeSlip => c == normal,
+                BoundaryKind::Open | BoundaryKind::Periodic => false,
+            };
+            let letter = ["x", "y"][c];
+            out[s].velocity[c] = match (velocity[c], traction[c]) {
+                (Some(v), None) => Some(compile(v)?),
+                (None, Some(_)) => None,
+                (Some(v), Some(_)) => {
+                    return Err(SceneError::at(
+                        v,
+                        format!("{name} gives both velocity_{letter} and traction_{letter}"),
+                        "give one of them",
+                    ));
+                }
+                (None, None) => held.then_some(FieldFn::Constant(0.0)),
+            };
+            out[s].traction[c] = traction[c].as_ref().map(compile).transpose()?;
+        }
+        out[s].rotation = side.rotation.as_ref().map(compile).transpose()?;
+    }
+    Ok(out)
+}
+
+/// Boundary conditions of sides, walls and blocks on the mesh.
+pub(super) fn boundary(
+    sides: [Side; 4],
+    walls: &Walls,
+    mesh: &Mesh,
+    units: &Units,
+    state: &Matter,
+) -> Result<BoundaryPlan> {
+    let mut lines = Vec::new();
+    let mut add = |segment: Segment, kind: WallKind, rotation| {
+        let segment = segment.on_mesh(mesh, units.length);
+        lines.push(WallLine { segment, no_slip: kind == WallKind::NoSlip, rotation });
+    };
+    for w in &walls.walls {
+        add(w.segment, w.kind, w.rotation);
+    }
+    for (range, kind) in &walls.blocks {
+        for normal in 0..2 {
+            let [from, to] = range[1 - normal];
+            for at in range[normal] {
+                add(Segment { normal, at, from, to }, *kind, None);
+            }
+        }
+    }
+    let held = |c: usize| {
+        sides.iter().any(|s| s.velocity[c].is_some())
+            || lines.iter().any(|w| w.segment.normal == c || w.no_slip)
+    };
+    let free_translation = [!held(0), !held(1)];
+    let compressible = state.materials.iter().any(|m| m.law.compliance > 0.0);
+    let closed = !compressible
+        && sides
+            .iter()
+            .enumerate()
+            .all(|(s, b)| b.periodic || b.velocity[side_normal(s)].is_some());
+    let plan = BoundaryPlan { sides, walls: lines, free_translation, closed };
+    if closed {
+        let (net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
+        if net.abs() > 1e-9 * total {
+            return Err(SceneError::new(
+                format!(
+                    "the given normal velocities let {:.3e} m2/s of incompressible fluid flow out",
+                    net * units.area_rate()
+                ),
+                "make them balance, open a side (kind = \"open\"), or give a bulk_viscosity",
+            ));
+        }
+    }
+    Ok(plan)
 }

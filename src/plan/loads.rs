@@ -1,10 +1,11 @@
 //! This module computes the loads that are constant during a run: `integral t . u~` of tractions on
 //! the sides, and `integral f . u~ + c w~` of body forces and couples fixed in space.
 
-use super::boundary::{BoundaryPlan, Side, side_normal};
+use super::boundary::{BoundaryPlan, Side};
 use super::{Plan, Units};
 use crate::scene::FieldFn;
 use crate::space::mesh::Mesh;
+use crate::space::shape::side_normal;
 use crate::space::shape::{GAUSS_5, NODES, Shape};
 
 impl Plan {

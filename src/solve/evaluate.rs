@@ -234,8 +234,8 @@ impl Evaluation<'_> {
         scratch: &Gathered,
     ) -> CutStiffness {
         let sides = between.map(|m| self.law_in_cell(cell, m, scratch));
-        let size = self.mesh.cell_size(cell);
-        let mut matrix = laminate::matrix(&Cut { interface, sides: &sides, size });
+        let cut = Cut { interface, sides: &sides, cell: self.mesh.cell_measure(cell) };
+        let mut matrix = laminate::matrix(&cut);
         matrix.iter_mut().flatten().for_each(|k| *k *= interface.trust);
         CutStiffness { matrix, rest: 1.0 - interface.trust }
     }

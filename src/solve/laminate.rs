@@ -47,6 +47,7 @@
 use super::element::PointShape;
 use crate::composition::interface::Interface;
 use crate::laws::point::{PointLaw, Sym2};
+use crate::space::measure::CellMeasure;
 use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
 
 /// Velocity unknowns of a cell, component by component.
@@ -74,7 +75,7 @@ pub struct Cut<'a> {
     pub interface: &'a Interface,
     /// Laws of either side at the points of [`GAUSS_6X6`].
     pub sides: &'a [[PointLaw; SUBPOINTS]; 2],
-    pub size: [f64; 2],
+    pub cell: CellMeasure,
 }
 
 /// The directions of `e` and `g` among `(D_xx - D_yy, 2 D_xy)`.
@@ -209,16 +210,16 @@ pub fn matrix(cut: &Cut) -> VelocityMatrix {
     let loose = LOOSE + (1.0 - LOOSE) * r;
 
     // Integrals over the two sides.
-    let area = cut.size[0] * cut.size[1];
+    let volume = cut.cell.volume();
     let mut compliance = [[0.0; 3]; 3];
     let mut tension = [[0.0; 2]; 2];
     let mut stretch = [[0.0; N]; 2];
     let mut shear = [[0.0; N]; 3];
     for (g, [a, b_inverse, k]) in GAUSS_6X6.iter().zip(at) {
-        let s = PointShape::new(&g.shape, cut.size);
+        let s = PointShape::new(&g.shape, cut.cell.size);
         let e = frame.stretch(&s);
         let v = [1.0, g.r[0], g.r[1]];
-        let u = [1.0, frame.along(g.r, cut.size)];
+        let u = [1.0, frame.along(g.r, cut.cell.size)];
         for i in 0..3 {
             for j in 0..=i {
                 compliance[i][j] += g.weight * b_inverse * v[i] * v[j];
@@ -236,7 +237,7 @@ pub fn matrix(cut: &Cut) -> VelocityMatrix {
     }
     // Of the whole cell: the 3 x 3 rule is exact.
     let mut fitted = [[0.0; N]; 3];
-    let shape = GAUSS_3X3.each_ref().map(|g| PointShape::new(&g.shape, cut.size));
+    let shape = GAUSS_3X3.each_ref().map(|g| PointShape::new(&g.shape, cut.cell.size));
     let sheared = shape.each_ref().map(|s| {
         let mut row = frame.shear(s);
         add_row(&mut row, means.k, &frame.stretch(s));
@@ -253,19 +254,19 @@ pub fn matrix(cut: &Cut) -> VelocityMatrix {
 
     let mut k = [[0.0; N]; N];
     lower_solve(&mut compliance, &mut shear);
-    shear.iter().for_each(|row| add_square(&mut k, area, row));
+    shear.iter().for_each(|row| add_square(&mut k, volume, row));
     lower_solve(&mut tension, &mut stretch);
-    stretch.iter().for_each(|row| add_square(&mut k, area, row));
+    stretch.iter().for_each(|row| add_square(&mut k, volume, row));
     upper_solve(&tension, &mut stretch);
     for ((g, s), mut row) in GAUSS_3X3.iter().zip(&shape).zip(sheared) {
-        let w = area * g.weight;
+        let w = volume * g.weight;
         for (fit, v) in fitted.iter().zip([1.0, g.r[0], g.r[1]]) {
             add_row(&mut row, -v, fit);
         }
         add_square(&mut k, w * loose * b_h, &row);
         let mut row = frame.stretch(s);
         add_row(&mut row, -1.0, &stretch[0]);
-        add_row(&mut row, -frame.along(g.r, cut.size), &stretch[1]);
+        add_row(&mut row, -frame.along(g.r, cut.cell.size), &stretch[1]);
         add_square(&mut k, w * loose * a_h, &row);
         add_square(&mut k, w * stiffening * dilation, &Frame::row(s, [0.0; 2], 1.0));
     }
@@ -332,6 +333,7 @@ mod tests {
     use crate::scene::Placement;
     use crate::solve::element::{LOCAL, Matrix, mirror};
     use crate::solve::terms::viscous::add_stiffness;
+    use crate::space::measure::Measure;
     use crate::space::mesh::{Axis, Mesh};
     use crate::space::particles::Particles;
     use crate::space::seeding::Seeding;
@@ -349,7 +351,11 @@ mod tests {
     }
 
     fn of(interface: &Interface, a: PointLaw, b: PointLaw) -> VelocityMatrix {
-        matrix(&Cut { interface, sides: &[[a; SUBPOINTS], [b; SUBPOINTS]], size: SIZE })
+        matrix(&Cut {
+            interface,
+            sides: &[[a; SUBPOINTS], [b; SUBPOINTS]],
+            cell: Measure::PLANE.of_cell(SIZE),
+        })
     }
 
     /// A straight interface through the cell, the second material above it.

@@ -50,6 +50,12 @@ pub struct CellMeasure {
 }
 
 impl CellMeasure {
+    /// Volume of the cell over its area.
+    #[inline(always)]
+    pub fn depth(&self) -> f64 {
+        self.depth
+    }
+
     /// Volume of the cell.
     #[inline(always)]
     pub fn volume(&self) -> f64 {

@@ -14,6 +14,11 @@ pub const SIDE_NODES: [[usize; 3]; 4] = [[0, 3, 6], [2, 5, 8], [0, 1, 2], [6, 7,
 /// Index of the node at the centre, which no other cell shares.
 pub const CENTRE: usize = 4;
 
+/// Direction of the normal of a side: 0 for x, 1 for y.
+pub fn side_normal(side: usize) -> usize {
+    side / 2
+}
+
 /// Quadratic Lagrange functions at -1, 0, 1 and their derivatives.
 const fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {
     ([0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)], [t - 0.5, -2.0 * t, t + 0.5])

@@ -5,6 +5,7 @@ mod dynamics;
 mod effects;
 mod exact;
 mod laws;
+mod measure;
 mod order;
 mod patch;
 mod rest;

@@ -2,24 +2,25 @@
 //! table of the scene.
 
 mod accuracy;
-mod boundaries;
 mod dye;
 mod gauges;
 mod materials;
 mod mesh;
+mod null_spaces;
 mod recording;
 mod regions;
 mod scales;
 mod schedule;
 mod time;
-mod values;
-mod walls;
+pub(super) mod values;
+pub(super) mod walls;
 
 pub use schedule::resolve;
 
-use super::boundary::{SIDES, side_normal};
+use super::boundary::{self, SIDES};
 use super::{EffectSet, InitialFields, Method, Plan, Warning};
 use crate::scene::{Field, FieldFn, Scene, SceneError, Scope};
+use crate::space::shape::side_normal;
 use materials::{SiMatter, thin_fluid};
 use regions::{placed, regions};
 use std::sync::Arc;
@@ -70,8 +71,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     gauges::interest(scene)?;
     let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &walls, &gauges, &units)?);
     state.relaxation = schedule::relaxation(&state, &mesh);
-    let sides = boundaries::sides(scene, scope, domain)?;
-    let boundary = boundaries::boundary(sides, &walls, &mesh, &units, &state)?;
+    let sides = boundary::sides(scene, scope, domain)?;
+    let boundary = boundary::boundary(sides, &walls, &mesh, &units, &state)?;
     let mut enclosure = walls.enclosure(scene, &mesh, &units);
     for (s, side) in boundary.sides.iter().enumerate() {
         let through =
@@ -133,7 +134,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         })
         .transpose()?
         .filter(|_| has_density);
-    boundaries::check_null_spaces(scene, &boundary, &mesh, &units, &effects, body_force.as_ref())?;
+    null_spaces::check_null_spaces(scene, &boundary, &mesh, &units, &effects, body_force.as_ref())?;
 
     let initial = si
         .materials

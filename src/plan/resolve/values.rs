@@ -1,13 +1,13 @@
 //! This module evaluates numbers and fields of a scene and checks their ranges.
 
-use crate::plan::boundary::side_normal;
 use crate::scene::{Field, FieldFn, Quantity, SceneError, Scope};
+use crate::space::shape::side_normal;
 
 /// A value, or an error of the scene with its position and remedy.
-pub(super) type Result<T> = std::result::Result<T, SceneError>;
+pub(in crate::plan) type Result<T> = std::result::Result<T, SceneError>;
 
 /// Evaluates a quantity that must be above zero.
-pub(super) fn positive(q: &Quantity, scope: &Scope, what: &str) -> Result<f64> {
+pub(in crate::plan) fn positive(q: &Quantity, scope: &Scope, what: &str) -> Result<f64> {
     let v = q.eval(scope)?;
     if v > 0.0 {
         return Ok(v);
@@ -15,7 +15,7 @@ pub(super) fn positive(q: &Quantity, scope: &Scope, what: &str) -> Result<f64> {
     Err(SceneError::at(q, format!("{what} is {v}"), format!("{what} must be above zero")))
 }
 
-pub(super) fn not_negative(q: &Quantity, scope: &Scope, what: &str) -> Result<f64> {
+pub(in crate::plan) fn not_negative(q: &Quantity, scope: &Scope, what: &str) -> Result<f64> {
     let v = q.eval(scope)?;
     if v >= 0.0 {
         return Ok(v);
@@ -23,19 +23,19 @@ pub(super) fn not_negative(q: &Quantity, scope: &Scope, what: &str) -> Result<f6
     Err(SceneError::at(q, format!("{what} is {v}"), format!("{what} must be zero or more")))
 }
 
-pub(super) fn pair(q: &[Quantity; 2], scope: &Scope) -> Result<[f64; 2]> {
+pub(in crate::plan) fn pair(q: &[Quantity; 2], scope: &Scope) -> Result<[f64; 2]> {
     Ok([q[0].eval(scope)?, q[1].eval(scope)?])
 }
 
 /// The ranges of x and y of a side of the domain.
-pub(super) fn edge(mut domain: [[f64; 2]; 2], side: usize) -> [[f64; 2]; 2] {
+pub(in crate::plan) fn edge(mut domain: [[f64; 2]; 2], side: usize) -> [[f64; 2]; 2] {
     domain[side_normal(side)] = [domain[side_normal(side)][side % 2]; 2];
     domain
 }
 
 /// The domain without a margin at its boundary. No mass lies on the boundary itself, so an
 /// acceleration may be infinite there.
-pub(super) fn middle(domain: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+pub(in crate::plan) fn middle(domain: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     domain.map(|[a, b]| [a + (b - a) / 128.0, b - (b - a) / 128.0])
 }
 
@@ -58,7 +58,7 @@ fn range_of(f: &FieldFn, [x, y]: [[f64; 2]; 2]) -> [f64; 2] {
     range
 }
 
-pub(super) fn finite_range(
+pub(in crate::plan) fn finite_range(
     q: &Field,
     f: &FieldFn,
     domain: [[f64; 2]; 2],

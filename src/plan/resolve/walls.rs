@@ -9,24 +9,24 @@ use crate::space::segment::Segment;
 use crate::space::walls::Enclosure;
 
 /// Walls and blocks in SI coordinates.
-pub(super) struct Walls {
-    pub(super) walls: Vec<SiWall>,
+pub(in crate::plan) struct Walls {
+    pub(in crate::plan) walls: Vec<SiWall>,
     /// Ranges along x and y (m) and kind of each block.
-    pub(super) blocks: Vec<([[f64; 2]; 2], WallKind)>,
+    pub(in crate::plan) blocks: Vec<([[f64; 2]; 2], WallKind)>,
 }
 
 /// A wall in SI coordinates.
-pub(super) struct SiWall {
-    pub(super) name: String,
-    pub(super) segment: Segment,
-    pub(super) kind: WallKind,
+pub(in crate::plan) struct SiWall {
+    pub(in crate::plan) name: String,
+    pub(in crate::plan) segment: Segment,
+    pub(in crate::plan) kind: WallKind,
     /// Prescribed rotation rate, 1/s.
-    pub(super) rotation: Option<f64>,
+    pub(in crate::plan) rotation: Option<f64>,
 }
 
 /// The segment between two points, or an error if it is not along a coordinate direction, has no
 /// length or leaves the domain.
-pub(super) fn axis_segment(
+pub(in crate::plan) fn axis_segment(
     what: &str,
     from: &[Quantity; 2],
     to: &[Quantity; 2],
@@ -66,7 +66,11 @@ pub(super) fn axis_segment(
 }
 
 impl Walls {
-    pub(super) fn new(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Walls> {
+    pub(in crate::plan) fn new(
+        scene: &Scene,
+        scope: &Scope,
+        domain: [[f64; 2]; 2],
+    ) -> Result<Walls> {
         let mut errors = Vec::new();
         let mut walls = Vec::new();
         for w in &scene.walls {
@@ -102,13 +106,13 @@ impl Walls {
     /// The lips of apertures: ends of walls that face each other across a gap. (Additional grading
     /// towards the upper ends of the silo's side walls takes 1.6 times the cells and changes the
     /// initial discharge by 1e-5.)
-    pub(super) fn lips(&self, domain: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
+    pub(in crate::plan) fn lips(&self, domain: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
         let tips = self.tips(domain);
         tips.iter().filter(|t| tips.iter().any(|o| t.faces(o))).map(|t| t.at).collect()
     }
 
     /// Free ends of walls: they lie inside the domain and on no other wall.
-    pub(super) fn tips(&self, [x, y]: [[f64; 2]; 2]) -> Vec<Tip> {
+    pub(in crate::plan) fn tips(&self, [x, y]: [[f64; 2]; 2]) -> Vec<Tip> {
         let mut tips = Vec::new();
         for (k, w) in self.walls.iter().enumerate() {
             for (p, up) in w.segment.ends().into_iter().zip([false, true]) {
@@ -132,7 +136,12 @@ impl Walls {
         tips
     }
 
-    pub(super) fn enclosure(&self, scene: &Scene, mesh: &Mesh, units: &Units) -> Enclosure {
+    pub(in crate::plan) fn enclosure(
+        &self,
+        scene: &Scene,
+        mesh: &Mesh,
+        units: &Units,
+    ) -> Enclosure {
         let l = units.length;
         let mut obstacles: Vec<Segment> =
             self.walls.iter().map(|w| w.segment.on_mesh(mesh, l)).collect();
@@ -150,8 +159,8 @@ impl Walls {
 }
 
 /// A free end of a wall.
-pub(super) struct Tip {
-    pub(super) at: [f64; 2],
+pub(in crate::plan) struct Tip {
+    pub(in crate::plan) at: [f64; 2],
     /// Direction of the normal of its wall.
     normal: usize,
     /// Whether it is the upper or right end.

@@ -131,7 +131,7 @@ impl Restoring {
             }
             // Faces alone have the whole gradient: at short steps these terms would count it twice.
             let restoring = measure.times(SUBCELL_STRENGTH * ahead * g * growth);
-            restoring * restoring / (restoring + SUBCELL_STEP * weakest)
+            restoring * restoring / (restoring + SUBCELL_STEP * weakest * measure.depth())
         }));
     }
 
