@@ -5,14 +5,14 @@
 //!
 //! - [`scene`] reads a scene from TOML. [`plan`] decides what will be solved, and why.
 //! - [`sim`] runs a plan: [`sim::start`] gives a [`sim::Run`], which takes steps and returns
-//!   results in SI units.
-//! - [`space`], [`solve`] and [`motion`] are the parts of a step; [`laws`] holds the equations of
-//!   the source as functions of small matrices.
-//! - [`record`] writes recordings, tables and plots, and [`compare`] reads them back. [`cases`]
-//!   holds scenes with exact solutions, [`verify`] measures their errors, and [`cost`] measures
-//!   error and time of settings.
-//! - [`sweep`] makes many runs of one scene; [`export`] converts recordings for other programs.
-//! - [`explorer`] is an interactive run with a web page.
+//!   results in SI units. [`sim::guard`] examines every step.
+//! - [`laws`] holds the constitutive laws as pure functions; [`frame`] holds what is shown of a run.
+//! - [`threads`] keeps a computation on one thread, or shares it out.
+//! - [`commands`] is the command line.
+//!
+//! The rest is private: how a step is computed (`space`, `composition`, `solve`, `motion`), how runs are
+//! driven, recorded, read back and compared (`session`, `record`, `results`, `compare`, `export`,
+//! `sweep`, `explorer`), and what is measured (`cases`, `verify`, `stress`, `cost`).
 //!
 //! ```
 //! use grainscope::{plan, scene, sim};
@@ -34,6 +34,8 @@
 //! assert!(v < 0.0, "the grains fall through the slit");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+
+#![warn(missing_docs)]
 
 pub(crate) mod cases;
 pub mod commands;

@@ -7,9 +7,14 @@
 
 use std::sync::OnceLock;
 
+/// An instruction set that this processor supports. Values are made only by [`Simd::detect`] and
+/// [`Simd::limit`], so that safe code cannot run a kernel that the processor does not support.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Simd(InstructionSet);
+
 /// Instruction sets that kernels are compiled for, in ascending order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Simd {
+pub enum InstructionSet {
     /// Baseline instruction set of the target.
     Portable,
     /// AVX2 with fused multiply-add.
@@ -20,6 +25,13 @@ pub enum Simd {
     Avx512,
 }
 
+impl InstructionSet {
+    /// Name of this instruction set.
+    pub fn name(self) -> &'static str {
+        Simd::NAMES.iter().find(|named| named.1 == self).map_or("portable", |named| named.0)
+    }
+}
+
 /// Environment variable that names the instruction set if no command-line option does.
 pub const VARIABLE: &str = "GRAINSCOPE_SIMD";
 
@@ -28,17 +40,17 @@ static LIMIT: OnceLock<Simd> = OnceLock::new();
 
 impl Simd {
     /// Instruction sets that kernels are compiled for on this architecture, with their names.
-    pub const NAMES: &[(&str, Simd)] = &[
-        ("portable", Simd::Portable),
+    pub const NAMES: &[(&str, InstructionSet)] = &[
+        ("portable", InstructionSet::Portable),
         #[cfg(target_arch = "x86_64")]
-        ("avx2", Simd::Avx2),
+        ("avx2", InstructionSet::Avx2),
         #[cfg(target_arch = "x86_64")]
-        ("avx512", Simd::Avx512),
+        ("avx512", InstructionSet::Avx512),
     ];
 
     /// Name of this instruction set.
     pub fn name(self) -> &'static str {
-        Self::NAMES.iter().find(|named| named.1 == self).map_or("portable", |named| named.0)
+        self.0.name()
     }
 
     /// Instruction set that kernels use: the one chosen by [`Simd::limit`], otherwise the best one
@@ -57,12 +69,12 @@ impl Simd {
     ///
     /// # Errors
     /// Returns the best instruction set of this processor if it does not support `set`.
-    pub fn limit(set: Simd) -> Result<(), Simd> {
+    pub fn limit(set: InstructionSet) -> Result<(), Simd> {
         let best = Self::detect();
-        if set > best {
+        if set > best.0 {
             return Err(best);
         }
-        LIMIT.get_or_init(|| set);
+        LIMIT.get_or_init(|| Simd(set));
         Ok(())
     }
 
@@ -75,13 +87,18 @@ impl Simd {
                 && is_x86_feature_detected!("avx512dq")
                 && is_x86_feature_detected!("fma")
             {
-                return Simd::Avx512;
+                return Simd(InstructionSet::Avx512);
             }
             if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                return Simd::Avx2;
+                return Simd(InstructionSet::Avx2);
             }
         }
-        Simd::Portable
+        Simd(InstructionSet::Portable)
+    }
+
+    /// Which set it is.
+    pub fn set(self) -> InstructionSet {
+        self.0
     }
 }
 
@@ -98,8 +115,8 @@ pub fn multiply_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
 /// `#[inline(always)]` functions: a closure that is not inlined is compiled for the baseline
 /// instruction set, where [`multiply_add`] with one rounding is a slow function call.
 ///
-/// SAFETY of the calls: [`Simd::detect`] returns `Simd::Avx512` and `Simd::Avx2` only if the
-/// processor has the features that the callee is compiled with; the callee itself is safe code.
+/// SAFETY of the calls: a [`Simd`] exists only if the processor has the features that the callee is
+/// compiled with; the callee itself is safe code.
 macro_rules! dispatch {
     ($(#[$doc:meta])* $vis:vis fn $name:ident $(<const $n:ident: usize>)? ($($arg:ident: $type:ty),* $(,)?)
      $(-> $out:ty)? = $kernel:ident) => {
@@ -115,14 +132,14 @@ macro_rules! dispatch {
             fn avx2 $(<const $n: usize>)? ($($arg: $type),*) $(-> $out)? {
                 $kernel::<8, true $(, $n)?>($($arg),*)
             }
-            match simd {
+            match simd.set() {
                 #[cfg(target_arch = "x86_64")]
                 #[allow(unsafe_code)]
-                $crate::simd::Simd::Avx512 => unsafe { avx512 $(::<$n>)? ($($arg),*) },
+                $crate::simd::InstructionSet::Avx512 => unsafe { avx512 $(::<$n>)? ($($arg),*) },
                 #[cfg(target_arch = "x86_64")]
                 #[allow(unsafe_code)]
-                $crate::simd::Simd::Avx2 => unsafe { avx2 $(::<$n>)? ($($arg),*) },
-                $crate::simd::Simd::Portable => {
+                $crate::simd::InstructionSet::Avx2 => unsafe { avx2 $(::<$n>)? ($($arg),*) },
+                $crate::simd::InstructionSet::Portable => {
                     const FMA: bool =
                         cfg!(any(target_arch = "aarch64", target_feature = "fma"));
                     $kernel::<8, FMA $(, $n)?>($($arg),*)
@@ -137,9 +154,6 @@ pub(crate) use dispatch;
 #[cfg(test)]
 pub fn all() -> Vec<Simd> {
     let best = Simd::detect();
-    #[cfg(target_arch = "x86_64")]
-    if best == Simd::Avx512 {
-        return vec![Simd::Portable, Simd::Avx2, best];
-    }
-    if best == Simd::Portable { vec![best] } else { vec![Simd::Portable, best] }
+    let sets = Simd::NAMES.iter().map(|named| Simd(named.1));
+    sets.filter(|set| *set <= best).collect()
 }

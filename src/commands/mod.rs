@@ -26,7 +26,7 @@ use crate::record::rerun_log::RecordError;
 use crate::scene::{self, Scene, SceneError, SceneSource};
 use crate::session::{SessionError, tell};
 use crate::sim::SimError;
-use crate::simd::{self, Simd};
+use crate::simd::{self, InstructionSet, Simd};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::Path;
 use std::process::ExitCode;
@@ -85,11 +85,11 @@ struct Cli {
     /// Instruction set of our own kernels, by default the best that the processor has; results of
     /// different sets differ in their last digits
     #[arg(long, global = true, value_name = "SET", value_parser = instruction_set)]
-    simd: Option<Simd>,
+    simd: Option<InstructionSet>,
 }
 
 /// Reads the name of an instruction set.
-fn instruction_set(name: &str) -> Result<Simd, String> {
+fn instruction_set(name: &str) -> Result<InstructionSet, String> {
     let found = Simd::NAMES.iter().find(|named| named.0 == name);
     let names = || Simd::NAMES.iter().map(|named| named.0).collect::<Vec<_>>().join(", ");
     found.map(|named| named.1).ok_or_else(|| format!("expected one of {}", names()))
@@ -263,7 +263,7 @@ fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
 }
 
 /// Sets the instruction set from the option, or else from the environment variable.
-fn set_simd(set: Option<Simd>) -> Result<(), Failure> {
+fn set_simd(set: Option<InstructionSet>) -> Result<(), Failure> {
     let by_environment = || {
         let name = std::env::var(simd::VARIABLE).ok()?;
         let wrong = |e| Failure::Environment(format!("{} is `{name}`: {e}", simd::VARIABLE));

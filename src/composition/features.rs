@@ -1,50 +1,55 @@
-//! What a material that is rare around a cell forms there: a sheet, a drop, or neither.
+//! This module recognises the shape of a material that is rare around a cell: a sheet, a drop, or
+//! neither.
 //!
-//! Both are features below a cell that no quadratic level set tells well, and need none: of a
-//! sheet the direction and the volume are enough, of a drop the volume. Positions are from the
-//! cell's centre in cell sizes, of the particles of the cell and its eight neighbours.
+//! Both are features smaller than a cell. A quadratic level set does not represent them well, and
+//! they do not need one: a sheet is given by its direction and its volume, a drop by its volume.
+//! Positions are relative to the centre of the cell, in cell sizes; they are those of the particles
+//! of the cell and its eight neighbours.
 //!
-//! **Sheet**: the particles lie along a straight strip that is narrower than a cell, long enough
-//! to be told from a drop, without gaps, and with the other material on both sides. An edge has
-//! the other material on one side only, a corner is too wide.
+//! **Sheet**: the particles lie along a straight strip that is narrower than about a cell, long
+//! enough to be distinguished from a drop, without gaps, and with the other material on both sides.
+//! At an edge the other material is on one side only; a corner is too wide.
 //!
-//! The strip's width is such that it holds as many particles as there are of its material.
+//! The width of the strip is chosen so that it contains as many particles as its material has.
 //!
-//! **Drop**: the particles are close together and away from the rim of the nine cells.
+//! **Drop**: the particles are close together and away from the boundary of the nine cells.
 
 use nalgebra::Matrix2;
 
-/// Widest sheet, in cells: those of 0.8 must pass whatever their noise.
+/// Largest width of a sheet, in cells; sheets of 0.8 cells must be accepted with any noise.
 const WIDEST: f64 = 1.1;
-/// Least length and least ratio of length to width of a sheet. One that only touches the cell's
-/// corner crosses the nine cells over 2 cell sizes.
+/// Smallest length of a sheet, in cells. A sheet that only touches the corner of the cell crosses
+/// the nine cells over 2 cell sizes.
 const SHORTEST: f64 = 1.4;
+/// Smallest ratio of the standard deviations along and across a sheet.
 const SLENDER: f64 = 2.2;
-/// Widest gap along a sheet.
+/// Largest gap along a sheet, in cells.
 const GAP: f64 = 1.0;
-/// Fewest particles of a sheet: fewer are in line by chance.
+/// Smallest number of particles of a sheet; fewer may be in line by chance.
 const FEWEST: usize = 5;
-/// Fewest particles of the other material on either side of a sheet.
+/// Smallest number of particles of the other material on either side of a sheet.
 const FLANK: usize = 2;
-/// How far the particles are that tell a sheet's direction.
+/// Largest distance, in cells, of the particles that determine the direction of a sheet.
 const WINDOW: f64 = 1.6;
-/// A drop is no larger than this, and no nearer to the rim of the nine cells than `RIM`.
+/// Upper limit of the extent of a drop along x and y, in cells.
 const LARGEST: f64 = 1.3;
+/// Smallest distance of a drop from the boundary of the nine cells, in cells.
 const RIM: f64 = 0.15;
 
-/// Position, and whether of the second material.
+/// Position of a particle, and whether it is of the second material.
 pub type Labelled = ([f64; 2], bool);
 
-/// Mean and axes of the particles of one material.
+/// Mean and principal axes of the positions of the particles of one material.
 struct Moments {
     count: usize,
     mean: [f64; 2],
-    /// Unit vectors along and across.
+    /// Unit vector along the larger axis.
     along: [f64; 2],
+    /// Unit vector along the smaller axis.
     across: [f64; 2],
-    /// Standard deviation across.
+    /// Standard deviation along the smaller axis.
     deviation: f64,
-    /// Of those along.
+    /// Standard deviation along the larger axis.
     deviation_along: f64,
 }
 
@@ -91,14 +96,15 @@ impl Moments {
 pub struct Strip {
     /// Unit normal.
     pub normal: [f64; 2],
-    /// Distance of its middle from the cell's centre, along the normal.
+    /// Distance of its centre line from the centre of the cell, along the normal.
     pub offset: f64,
+    /// Width.
     pub width: f64,
 }
 
 impl Strip {
-    /// The share of the strip's material around a point of the cell, at which the strip's rims
-    /// are ramps of the given width.
+    /// Share of the strip's material around a point of the cell; the edges of the strip are ramps
+    /// of the given width.
     pub fn share(&self, at: [f64; 2], ramp: f64) -> f64 {
         let distance = self.normal[0] * at[0] + self.normal[1] * at[1] - self.offset;
         let half = 0.5 * self.width;
@@ -107,7 +113,7 @@ impl Strip {
         ((top - bottom) / ramp).clamp(0.0, 1.0)
     }
 
-    /// Its area in the cell.
+    /// Area of the strip in the cell, as a fraction of the cell.
     pub fn area(&self, ramp: f64) -> f64 {
         const SIDE: usize = 16;
         let at = |k: usize| (k as f64 + 0.5) / SIDE as f64 - 0.5;
@@ -117,12 +123,12 @@ impl Strip {
     }
 }
 
-/// The sheet that a material forms, if it forms one. What is in `room` is void.
+/// Finds the sheet that a material forms; `None` if it forms none. `room` is working memory.
 pub fn sheet(particles: &[Labelled], second: bool, room: &mut Vec<f64>) -> Option<Strip> {
     let of = |label| particles.iter().filter(move |p| p.1 == label).map(|p| p.0);
-    // In a round window a strip's ends do not tilt its axes.
+    // In a round window the ends of a strip do not tilt its axes.
     let m = Moments::new(of(second).filter(|p| p[0].hypot(p[1]) < WINDOW))?;
-    // Of a strip of constant density.
+    // The width of a strip of constant density with this deviation.
     let width = 12f64.sqrt() * m.deviation;
     if m.count < FEWEST || width > WIDEST || m.deviation_along < SLENDER * m.deviation {
         return None;
@@ -135,7 +141,7 @@ pub fn sheet(particles: &[Labelled], second: bool, room: &mut Vec<f64>) -> Optio
     if last - first < SHORTEST || along.windows(2).any(|w| w[1] - w[0] > GAP) {
         return None;
     }
-    // Beside the strip, not beyond its ends, where a corner has the other material too.
+    // Count beside the strip, not beyond its ends, where a corner has the other material too.
     let beyond = 0.5 * width + 0.1;
     let flank = |side: f64| {
         let beside = |[s, d]: [f64; 2]| side * d > beyond && first < s && s < last;
@@ -144,7 +150,7 @@ pub fn sheet(particles: &[Labelled], second: bool, room: &mut Vec<f64>) -> Optio
     if flank(1.0) < FLANK || flank(-1.0) < FLANK {
         return None;
     }
-    // As many particles lie in the strip as are of its material.
+    // The strip contains as many particles as its material has.
     let count = along.len();
     let distance = room;
     distance.clear();
@@ -213,7 +219,7 @@ mod tests {
     fn edges_and_corners_are_neither_sheet_nor_drop() {
         for seed in 0..200 {
             let angle = 0.37 * seed as f64;
-            // As far as edges that cross the central cell are.
+            // The largest distance of edges that cross the central cell.
             let offset = 0.7 * (1.7 * angle).sin();
             let edge = particles(seed, |p| distance(p, angle) > offset);
             let corner = particles(seed, |p| {

@@ -1,5 +1,5 @@
-//! What the particles of one cell show: volumes, shares at the Gauss points, orientations, fits of
-//! carried viscosities, and how two materials lie to each other.
+//! This module computes sums over the particles of one cell: volumes, shares at the Gauss points,
+//! orientations, fits of carried viscosities, and the arrangement of two materials.
 //!
 //! The share of material `m` at Gauss point `g` is the particle volume near it, weighted by
 //! `exp(-r^2 / (0.4 h)^2)`.
@@ -14,40 +14,45 @@ use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_3, GAUSS_3X3};
 use std::cell::RefCell;
 
-/// Width of the kernel in cells: 0.4 was the best of those measured.
+/// Width of the kernel in cells; 0.4 gave the smallest error of the values tested.
 const KERNEL_WIDTH: f64 = 0.4;
 
-/// Matching of shares to volumes stops here: far below the noise of the particles.
+/// Tolerance of the iteration that matches shares to volumes; far below the noise of the particles.
 const MATCHING_TOLERANCE: f64 = 1e-6;
+/// Largest number of iterations that match shares to volumes.
 const MATCHING_ITERATIONS: usize = 30;
 
 /// Sums over the particles of one cell, by Gauss point and material.
 #[derive(Default)]
 pub struct Gathered {
-    /// Kernel-weighted volume, then share; index `9 m + g`.
+    /// Kernel-weighted volume, later the share; index `9 m + g`.
     weight: Vec<f64>,
+    /// Orientation of the directors near a Gauss point; index `9 m + g`.
     orientation: Vec<Orientation>,
-    /// Per material.
+    /// Volume of each material.
     volume: Vec<f64>,
+    /// Points and values of the fits of `ln eta`, by material.
     log_viscosity: Vec<Fit>,
     /// Fits of `ln eta`, by material.
     viscosity: Vec<Option<Polynomial>>,
-    /// Of all of the cell's particles, by material.
+    /// Orientation of all directors of the cell, by material.
     cell_orientation: Vec<Orientation>,
+    /// Particles of the cell and its neighbours.
     surroundings: Surroundings,
+    /// Working memory.
     numbers: Vec<f64>,
 }
 
 thread_local! {
-    /// Each thread's own room.
+    /// Working memory of each thread.
     pub static SCRATCH: RefCell<Gathered> = RefCell::default();
 }
 
-/// Two materials of a cell and the particles around it.
+/// The two materials of a cell and the particles around it.
 pub struct Neighbourhood<'a> {
     /// Indices of the two materials.
     pub between: [usize; 2],
-    /// Share of the second one.
+    /// Share of the second material in the volume of the cell's particles.
     pub share: f64,
     size: [f64; 2],
     surroundings: &'a Surroundings,
@@ -60,21 +65,22 @@ impl Neighbourhood<'_> {
         features::is_drop(self.surroundings.particles(), second)
     }
 
-    /// The rims of a sheet that the first or the second material forms, if they can be trusted.
+    /// Edges of a sheet that the first or the second material forms; `None` if there is no sheet or
+    /// it cannot be trusted.
     pub fn sheet(&mut self, second: bool) -> Option<Interface> {
         let strip: Strip = features::sheet(self.surroundings.particles(), second, self.numbers)?;
         let interface = Interface::of_sheet(&strip, second, self.size, self.share);
         (interface.trust > 0.0).then_some(interface)
     }
 
-    /// The interface, if there is one that can be trusted.
+    /// The interface; `None` if there is none that can be trusted.
     pub fn interface(&self) -> Option<Interface> {
         self.surroundings.interface(self.share).filter(|i| i.trust > 0.0)
     }
 }
 
 impl Gathered {
-    /// Makes room for a number of materials.
+    /// Allocates memory for a number of materials.
     pub fn prepare(&mut self, materials: usize) {
         self.weight.resize(9 * materials, 0.0);
         self.orientation.resize(9 * materials, Orientation::default());
@@ -83,7 +89,7 @@ impl Gathered {
         self.cell_orientation.resize(materials, Orientation::default());
     }
 
-    /// Takes up the particles of a cell.
+    /// Computes the sums over the particles of a cell.
     pub fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, kinds: &[Kind]) {
         self.weight.fill(0.0);
         self.orientation.fill(Orientation::default());
@@ -118,7 +124,8 @@ impl Gathered {
         }
     }
 
-    /// The two materials of the cell and the particles around it; `None` if there are more or fewer.
+    /// The two materials of the cell and the particles around it; `None` if the cell has more or
+    /// fewer materials.
     pub fn neighbourhood(
         &mut self,
         mesh: &Mesh,
@@ -142,9 +149,10 @@ impl Gathered {
         })
     }
 
-    /// Turns kernel weights into shares whose mean over the cell is each material's share of
-    /// the particles' volume: weights of a material are scaled by a common factor, found by
-    /// fixed-point iteration. So a cell weighs what its particles weigh.
+    /// Converts kernel weights to shares whose mean over the cell is each material's share of the
+    /// volume of the particles, multiplied by `factors`: a fixed-point iteration finds a common
+    /// factor for the weights of each material. The volume of each material in the cell is then
+    /// that of its particles.
     pub fn match_volumes(&mut self, factors: &[f64]) {
         let materials = factors.len();
         let wanted = |volume: &[f64], m: usize| volume[m] * factors[m];
@@ -178,7 +186,7 @@ impl Gathered {
         }
     }
 
-    /// Fits the carried viscosities; [`Gathered::viscosity_at`] then reads them.
+    /// Fits the carried viscosities, which [`Gathered::viscosity_at`] then returns.
     pub fn fit_viscosities(&mut self) {
         self.viscosity.clear();
         self.viscosity.extend(self.log_viscosity.iter().map(|f| f.solve(Degree::Quadratic)));
@@ -205,7 +213,7 @@ impl Gathered {
     }
 
     /// Carried viscosity of a material at reference coordinates `r`, after
-    /// [`Gathered::fit_viscosities`]; `None` where its particles carry none.
+    /// [`Gathered::fit_viscosities`]; `None` if its particles carry none.
     pub fn viscosity_at(&self, material: usize, r: [f64; 2]) -> Option<f64> {
         self.viscosity[material].as_ref().map(|fit| fit.at_bounded(r).exp())
     }

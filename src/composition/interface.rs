@@ -1,20 +1,23 @@
-//! Where the interface of a cell cut by two materials runs, from the particles around it.
+//! This module finds the interface in a cell that contains two materials, from the particles around
+//! it.
 //!
-//! The particles of the cell and of its eight neighbours that are of either material are
-//! separated by a quadratic level set, by logistic regression of their labels `y` (0 or 1),
+//! A quadratic level set separates the particles of the two materials in the cell and its eight
+//! neighbours. It is found by logistic regression of their labels `y` (0 or 1),
 //!
 //! ```text
 //! f(x) = a + g.x + x.H x / 2,   min  sum_p ln(1 + e^f) - y f  +  (lambda/2) (|g|^2 + |H|^2),
 //! ```
-//! `x` from the cell's centre in cell sizes. It finds edges, curved ones too, sheets (`f` positive
-//! in a strip) and drops (in an ellipse). Its area in a cell errs by 0.02-0.03 with 16 jittered
-//! particles per cell, where counting the cell's own particles errs by 0.05.
+//! with `x` relative to the centre of the cell, in cell sizes. The level set represents edges, also
+//! curved ones, sheets (`f` positive in a strip) and drops (in an ellipse). The error of its area
+//! in a cell is 0.02-0.03 with 16 jittered particles per cell; if the cell's own particles are
+//! counted, the error is 0.05.
 //!
-//! The direction of the interface is the largest eigenvector of `sum delta(f) n n^T`, and the
-//! difference of the eigenvalues tells how much of a direction it has: one for an edge or a sheet,
-//! nothing for a drop.
+//! The normal of the interface is the eigenvector of `sum delta(f) n n^T` with the largest
+//! eigenvalue. The normalised difference of the eigenvalues is the coherence of the direction: one
+//! for an edge or a sheet, zero for a drop.
 //!
-//! Stiff sheets below a cell are told by [`features`](super::features) and have straight rims.
+//! Stiff sheets thinner than a cell are found by [`features`](super::features) and have straight
+//! edges.
 
 use super::features::{Labelled, Strip};
 use crate::space::mesh::Mesh;
@@ -22,23 +25,26 @@ use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_6X6, SUBPOINTS};
 use nalgebra::{SMatrix, SVector};
 
-/// lambda: it must let a sheet of half a cell bend `f` enough, and hold separable labels.
+/// Regularisation `lambda`: small enough for the curvature of `f` in a sheet of half a cell, large
+/// enough for separable labels.
 const RIDGE: f64 = 2e-3;
+/// Number of Newton steps of the regression.
 const NEWTON_STEPS: usize = 6;
-/// Where the regression is surer of a particle than this it stops looking at it.
+/// Value of `|f|` beyond which a correctly classified particle is omitted.
 const CERTAIN: f64 = 9.0;
 /// Width of the ramp from one material to the other, in cells: the spacing of the points.
 const RAMP: f64 = 1.0 / 6.0;
-/// The same of a sheet's rims: points are farther apart than a ramp in the middle of the cell.
+/// Width of the ramp at the edges of a sheet, in cells: at the centre of the cell the points are
+/// farther apart than a ramp.
 const SHEET_RAMP: f64 = 0.3;
-/// Points within this distance (cells) of the interface have a say in its direction.
+/// Distance from the interface, in cells, over which the weight of a point in the direction decays.
 const NEAR: f64 = 0.25;
-/// Coherence below which there is no direction, and from which on it is certain.
+/// Coherence below which there is no direction, and coherence from which the direction is certain.
 const COHERENCE: [f64; 2] = [0.3, 0.7];
-/// Difference to the cell's own share of particles: up to which it is noise, and from which on
-/// the level set is not what the cell holds (two sheets, debris).
+/// Difference from the share of the cell's own particles: up to the first value it is noise, from
+/// the second value the level set does not represent the cell (two sheets, debris).
 const MISFIT: [f64; 2] = [0.1, 0.2];
-/// Of a sheet, of which a cell may hold few particles.
+/// The same limits for a sheet, of which a cell may contain few particles.
 const SHEET_MISFIT: [f64; 2] = [0.25, 0.5];
 
 /// The interface in one cell.
@@ -46,21 +52,22 @@ const SHEET_MISFIT: [f64; 2] = [0.25, 0.5];
 pub struct Interface {
     /// Share of the second material at the points of [`GAUSS_6X6`].
     pub share: [f64; SUBPOINTS],
-    /// Unit normal, either way.
+    /// Unit normal; its sign is arbitrary.
     pub normal: [f64; 2],
-    /// Whether it is that of a stiff sheet below a cell, whose tension is real.
+    /// Whether the interface is that of a stiff sheet thinner than a cell, whose tension is not
+    /// limited.
     pub sheet: bool,
-    /// 0: there is no such interface, 1: there certainly is.
+    /// Trust in the interface: 0 if there is none, 1 if it is certain.
     pub trust: f64,
 }
 
 impl Interface {
-    /// The rims of a sheet, whose material is the second one or not and has the share `wanted` of
-    /// the cell.
+    /// The edges of a sheet. `second` tells whether its material is the second one; `wanted` is its
+    /// share of the cell.
     pub fn of_sheet(strip: &Strip, second: bool, [hx, hy]: [f64; 2], wanted: f64) -> Self {
         let mut inside =
             GAUSS_6X6.each_ref().map(|g| strip.share([0.5 * g.r[0], 0.5 * g.r[1]], SHEET_RAMP));
-        // The points are too few for a thin strip: its area is right anyway.
+        // The points are too few for a thin strip, so the shares are scaled to its area.
         let found: f64 = GAUSS_6X6.iter().zip(inside).map(|(g, s)| g.weight * s).sum();
         let area = strip.area(SHEET_RAMP);
         if found > 0.0 {
@@ -76,19 +83,21 @@ impl Interface {
     }
 }
 
-/// `a, g_x, g_y, H_xx, H_xy, H_yy`
+/// Coefficients `a, g_x, g_y, H_xx, H_xy, H_yy` of the level set.
 type Coefficients = [f64; 6];
 
+/// Functions that the coefficients multiply.
 fn basis([x, y]: [f64; 2]) -> [f64; 6] {
     [1.0, x, y, 0.5 * x * x, x * y, 0.5 * y * y]
 }
 
+/// Value of the level set with the coefficients `f` at a point with the basis `x`.
 #[inline(always)]
 fn value(f: &[f64; 6], x: &[f64; 6]) -> f64 {
     f.iter().zip(x).map(|(f, x)| f * x).sum()
 }
 
-/// Room for the particles around a cell, kept from cell to cell.
+/// Particles around a cell, with memory reused from cell to cell.
 #[derive(Default)]
 pub struct Surroundings {
     particles: Vec<Labelled>,
@@ -96,19 +105,19 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Around the last gathered cell, from its centre in cell sizes.
+    /// Particles around the last gathered cell, relative to its centre in cell sizes.
     pub fn particles(&self) -> &[Labelled] {
         &self.particles
     }
 
-    /// The interface in the gathered cell, of which the second material has the share `wanted`.
-    /// `None` if the regression fails.
+    /// Interface in the gathered cell, of which the second material has the share `wanted`; `None`
+    /// if the regression fails.
     pub fn interface(&self, wanted: f64) -> Option<Interface> {
         let f = self.regress()?;
         Some(describe(&f, self.size, wanted))
     }
 
-    /// Takes up the particles of two materials in a cell and around it.
+    /// Collects the particles of two materials in a cell and around it.
     pub fn gather(&mut self, mesh: &Mesh, particles: &Particles, cell: usize, between: [usize; 2]) {
         let [a, b] = between;
         self.size = mesh.cell_size(cell);
@@ -120,7 +129,7 @@ impl Surroundings {
             period(mesh.x.periodic(), mesh.x.length()),
             period(mesh.y.periodic(), mesh.y.length()),
         );
-        // The nearest image; an infinite period has only the one.
+        // The nearest periodic image; without periodicity the period is infinite.
         let nearest = |d: f64, l: f64| {
             if d > 0.5 * l {
                 d - l
@@ -146,7 +155,7 @@ impl Surroundings {
         }
     }
 
-    /// Newton's method; starts from nothing, where its first step is linear least squares.
+    /// Newton's method from zero, where the first step is linear least squares.
     fn regress(&self) -> Option<Coefficients> {
         let mut f: Coefficients = [0.0; 6];
         for _ in 0..NEWTON_STEPS {
@@ -181,11 +190,12 @@ impl Surroundings {
     }
 }
 
-/// One below `a`, zero above `b`.
+/// One below `a`, zero above `b`, linear in between.
 fn fade(x: f64, [a, b]: [f64; 2]) -> f64 {
     ((b - x) / (b - a)).clamp(0.0, 1.0)
 }
 
+/// The interface of a level set in a cell.
 fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
     let mut share = [0.0; SUBPOINTS];
     let mut held = 0.0;
@@ -198,7 +208,7 @@ fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
         let distance = value(f, &basis(at)) / slope;
         *share = (0.5 + distance / RAMP).clamp(0.0, 1.0);
         held += g.weight * *share;
-        // Directions are those of the world, not of a stretched cell.
+        // Directions are physical, not those of the stretched reference cell.
         let (nx, ny) = (gx / hx, gy / hy);
         let nearness = (-(distance / NEAR).powi(2)).exp() / (nx * nx + ny * ny).max(1e-60);
         xx += nearness * nx * nx;
@@ -223,8 +233,8 @@ mod tests {
 
     const CENTRE: usize = 4;
 
-    /// Jittered particles on 3 x 3 unit cells, labelled by a function of the distance from the
-    /// centre; the interface in the central cell and its true area there.
+    /// Jittered particles on 3 x 3 unit cells, labelled by a function of the position relative to
+    /// the centre; the interface in the central cell and its true area there.
     fn find(seed: u64, second: impl Fn([f64; 2]) -> bool) -> (Interface, f64) {
         let axis = || Axis::new(vec![0.0, 1.0, 2.0, 3.0], false);
         let mesh = Mesh::new(axis(), axis());

@@ -1,8 +1,8 @@
-//! What is where: from particles to the materials of each cell, their shares, interfaces and
-//! fitted fields. Nothing here knows a constitutive law.
+//! This module determines, from the particles, which materials each cell contains, with their
+//! shares, interfaces and fitted fields. It does not use constitutive laws.
 //!
-//! [`Composition`] says for every cell what it is made of; [`Gathered`] holds what the particles of
-//! one mixed cell show, for [`solve::quadrature`](crate::solve::quadrature) to evaluate.
+//! [`Composition`] holds the content of every cell. [`Gathered`] holds the sums over the particles
+//! of one mixed cell, which [`solve::quadrature`](crate::solve::quadrature) evaluates.
 
 pub mod features;
 mod gather;
@@ -14,25 +14,27 @@ use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::threads;
 
-/// Cells that are worth a task of their own.
+/// Largest number of cells per task.
 const GRAIN: usize = 32;
 
-/// Settings of [`Composition::keep_volumes`]: gain, largest step, and least response.
+/// Gain of [`Composition::keep_volumes`].
 const VOLUME_GAIN: f64 = 0.3;
+/// Largest change of the logarithm of a factor in one step.
 const LARGEST_STEP: f64 = 0.05;
+/// Smallest response `S_m`, as a fraction of the area of the mesh, for an adjustment.
 const LEAST_RESPONSE: f64 = 1e-4;
 
-/// What a cell is made of.
+/// Content of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// One uniform material, named by its index and the version of the material table.
+    /// One uniform material, identified by its index and the version of the material table.
     Uniform {
         /// Index of the material.
         material: u8,
-        /// Counts changes of the material table.
+        /// Number of changes of the material table.
         version: u32,
     },
-    /// Anything else: evaluated in every step.
+    /// Any other content; evaluated in every step.
     Mixed,
     /// A solid block.
     Solid,
@@ -40,45 +42,46 @@ pub enum Content {
     Unknown,
 }
 
-/// What the composition must know of a material.
+/// Properties of a material that the composition needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
-    /// Its law and density are constants.
+    /// Whether its law and density are constants.
     pub uniform: bool,
-    /// Its directors matter.
+    /// Whether its law depends on directors.
     pub directors: bool,
-    /// Its particles carry a viscosity.
+    /// Whether its particles carry a viscosity.
     pub viscosity: bool,
 }
 
-/// A cell that holds no particles though no background fills it.
+/// A cell that has neither particles nor a background material.
 #[derive(Debug, thiserror::Error)]
 #[error("cell {cell} at ({x:.4e}, {y:.4e}) holds no particles and no background material fills it")]
 pub struct EmptyCell {
     /// Index of the cell.
     pub cell: usize,
-    /// Coordinates of its centre.
+    /// Coordinate x of its centre.
     pub x: f64,
-    /// See `x`.
+    /// Coordinate y of its centre.
     pub y: f64,
 }
 
 /// The materials of all cells.
 pub struct Composition {
     materials: usize,
+    /// Content of each cell.
     content: Vec<Content>,
-    /// Share of each material in each cell.
+    /// Volume fraction of each material in each cell; index `cell * materials + material`.
     pub(crate) fractions: Vec<f64>,
     /// Factor on each material's volume in cut cells; see [`Composition::keep_volumes`].
     factors: Vec<f64>,
-    /// Cells whose content may have changed in the last update.
+    /// Whether the content of each cell may have changed in the last update.
     fresh: Vec<bool>,
-    /// What the last update found in each cell; `None` in an empty one.
+    /// Content of each cell in the last update; `None` if the cell is empty.
     found: Vec<Option<Content>>,
 }
 
 impl Composition {
-    /// Nothing is known of any cell yet.
+    /// Creates a composition of unknown content.
     pub fn new(cells: usize, materials: usize) -> Self {
         Composition {
             materials,
@@ -90,17 +93,17 @@ impl Composition {
         }
     }
 
-    /// What a cell is made of.
+    /// Content of a cell.
     pub fn content(&self, cell: usize) -> Content {
         self.content[cell]
     }
 
-    /// Declares what a cell is made of.
+    /// Sets the content of a cell.
     pub(crate) fn set_content(&mut self, cell: usize, content: Content) {
         self.content[cell] = content;
     }
 
-    /// What every cell is made of.
+    /// Content of every cell.
     pub fn contents(&self) -> &[Content] {
         &self.content
     }
@@ -110,7 +113,7 @@ impl Composition {
         self.fresh[cell]
     }
 
-    /// Share of a material in a cell.
+    /// Volume fraction of a material in a cell.
     pub fn fraction(&self, cell: usize, material: usize) -> f64 {
         self.fractions[cell * self.materials + material]
     }
@@ -120,22 +123,22 @@ impl Composition {
         &self.factors
     }
 
-    /// Goes back to the factors of an earlier state.
+    /// Restores the factors of an earlier state.
     pub fn set_factors(&mut self, factors: &[f64]) {
         self.factors.copy_from_slice(factors);
     }
 
-    /// Area of a material as the solver sees it.
+    /// Volume of a material in the quadrature of the solver (an area in the plane, per unit depth).
     pub fn projected_area(&self, mesh: &Mesh, material: usize) -> f64 {
         let share = |cell| [self.fraction(cell, material) * mesh.cell_volume(cell)];
         threads::sum(0..mesh.cells(), share)[0]
     }
 
-    /// Finds out what every cell is made of. `particles` sorted; `moving`: a cell with particles
-    /// counts as mixed.
+    /// Determines the content of every cell. `particles` must be sorted. With `moving`, every cell
+    /// with particles counts as mixed.
     ///
     /// # Errors
-    /// A cell that nothing fills.
+    /// Returns [`EmptyCell`] if a cell has neither particles nor a background material.
     pub fn update(
         &mut self,
         mesh: &Mesh,
@@ -165,16 +168,18 @@ impl Composition {
         Ok(())
     }
 
-    /// Lets each material's projected area follow the volume of its particles, which is exact.
+    /// Adjusts the factors so that the projected area of each material approaches the volume of its
+    /// particles, which is exact.
     ///
-    /// In cut cells a material's share is that of its particles' volume times a factor of its
-    /// own; the factors are adjusted a little each step,
+    /// In cut cells the share of a material is that of the volume of its particles times a factor.
+    /// The factors are adjusted a little in each step,
     ///
     /// ```text
-    /// d ln f_m = gain (V_m - P_m) / S_m,   P_m = sum A phi,   S_m = dP_m/d ln f_m = sum A phi (1 - phi)
+    /// d ln f_m = gain (V_m - P_m) / S_m
+    /// P_m = sum A phi,   S_m = dP_m/d ln f_m = sum A phi (1 - phi)
     /// ```
-    /// which shifts all of its rim by the same small distance (a hundredth of a cell on the
-    /// silo). Without it the projected volume of the grains wanders by 0.3 %.
+    /// which shifts the whole boundary of the material by the same small distance (a hundredth of a
+    /// cell on the silo). Without this the projected volume of the grains drifts by 0.3 %.
     pub(crate) fn keep_volumes(&mut self, mesh: &Mesh, particles: &Particles) {
         let [area] = threads::sum(0..mesh.cells(), |cell| {
             [if mesh.solid[cell] { 0.0 } else { mesh.cell_volume(cell) }]
@@ -184,10 +189,10 @@ impl Composition {
         for m in 0..self.materials {
             let [projected, response] = threads::sum(0..mesh.cells(), |cell| {
                 let (phi, area) = (self.fraction(cell, m), mesh.cell_volume(cell));
-                // Nothing is in a solid one.
+                // The fractions of a solid cell are zero.
                 [area * phi, area * phi * (1.0 - phi)]
             });
-            // Without cut cells, or with next to none, there is no rim to shift.
+            // Without cut cells, or with very few, there is no boundary to shift.
             if response > LEAST_RESPONSE * area {
                 let missing = (particles.volume_of(m) * scale - projected) / response;
                 let step = (VOLUME_GAIN * missing).clamp(-LARGEST_STEP, LARGEST_STEP);
@@ -197,7 +202,7 @@ impl Composition {
     }
 }
 
-/// What a cell is made of; `None` if nothing fills it.
+/// Content of a cell; `None` if it has neither particles nor a background material.
 fn content(
     particles: &Particles,
     cell: usize,

@@ -1,4 +1,5 @@
-//! One correction of a state, and its combination with those before it.
+//! This module computes one correction of velocity and pressure and combines it with the previous
+//! corrections.
 
 use super::element::SKELETON_NODES;
 use super::multifrontal::tree::NO_POSITION;
@@ -9,11 +10,11 @@ use crate::space::flow::Flow;
 use crate::space::shape::{CENTRE, NODES};
 use crate::threads;
 
-/// Most corrections that a new one is combined with.
+/// Largest number of previous corrections that a new one is combined with.
 const MOST_DIRECTIONS: usize = 6;
 
 impl<const D: usize> Stokes<D> {
-    /// One correction.
+    /// Computes one correction from the residual.
     pub(super) fn correct(&mut self, quadrature: &Quadrature, work: &mut Work<D>) {
         let Work { residual, shares, skeleton, correction, .. } = work;
         let Stokes { mesh, incidence, constraints, matrices, factor, .. } = self;
@@ -22,7 +23,8 @@ impl<const D: usize> Stokes<D> {
             force
         };
         let shares = &mut shares[..mesh.cells()];
-        // Right-hand side of each cell, its centre condensed; there the whole force.
+        // The right-hand side of each cell, with the centre node condensed; the entry of the centre
+        // holds the whole force.
         threads::for_each(shares, CELL_GRAIN, |cell, share| {
             if mesh.solid[cell] {
                 return;
@@ -61,7 +63,7 @@ impl<const D: usize> Stokes<D> {
             let position = tree.position[node];
             *du = if position == NO_POSITION { [0.0; D] } else { free(node, x[position as usize]) };
         });
-        // The centre comes back, and the pressure.
+        // The change of the velocity at the centre node and of the pressure.
         let velocity = &correction.velocity;
         threads::for_each(shares, CELL_GRAIN, |cell, share| {
             if mesh.solid[cell] {
@@ -104,8 +106,8 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    /// Combines a correction with those before it: of all sums of them the one that leaves the
-    /// least divergence.
+    /// Replaces the correction by the linear combination of it and the previous ones that leaves
+    /// the smallest divergence. Does nothing if the forces do not balance.
     pub(super) fn combine(&self, work: &mut Work<D>, balanced: bool) {
         if !balanced {
             return;
@@ -144,6 +146,7 @@ impl<const D: usize> Stokes<D> {
         sum
     }
 
+    /// Adds the correction to the flow.
     pub(super) fn apply(&self, work: &Work<D>, flow: &mut Flow<D>) {
         add_scaled(&mut flow.velocity, 1.0, &work.correction.velocity);
         add_scaled(&mut flow.pressure, 1.0, &work.correction.pressure);

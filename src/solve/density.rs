@@ -1,4 +1,4 @@
-//! The density of each cell as gravity sees it.
+//! This module computes the density of each cell for the weight.
 //!
 //! In a cut cell the share of material `m` varies linearly, with the volume and the first moments
 //! of its particles,
@@ -6,27 +6,30 @@
 //! ```text
 //! chi_m(xi, eta) = s_m (1 + 3 X_m xi + 3 Y_m eta),   rho = sum_m chi_m rho_m
 //! ```
-//! where `s_m` is the material's share of the particles' volume and `(X_m, Y_m)` its centroid: the
-//! projection of the true density on linear functions, known without any guess between particles.
-//! What it leaves out works only on the curvature of the velocity. Shares smoothed by a kernel,
-//! which serve the viscosity, would carry the noise of the particles' places into the load: a
-//! level at rest inside a cell of 32 then moves with 3e-3 rho g a^2/eta at a viscosity contrast of
-//! 1000, and not at all with exact moments.
+//! where `s_m` is the material's share of the volume of the particles and `(X_m, Y_m)` its
+//! centroid. This is the projection of the true density on linear functions, which needs no
+//! assumption about the density between particles. The omitted part does work only on the curvature
+//! of the velocity. Shares smoothed by a kernel, which the viscosity uses, would transfer the noise
+//! of the particles' positions to the load: on a mesh of 32 cells, a horizontal interface at rest
+//! inside a cell then moves with 3e-3 rho g a^2/eta at a viscosity contrast of 1000, and not at all
+//! with exact moments.
 //!
-//! The particles' centroids together should be the cell's centre. As particles slide past one another
-//! they are not, until some cross a face: the centroids are shifted to make good for it, those of
+//! The centroid of all particles of a cell should be its centre. As particles slide past one
+//! another it is not, until some cross a face. The centroids are shifted to compensate, those of
 //! materials that move easily more than those of stiff ones,
 //!
 //! ```text
-//! X_m - o w_m,   o = sum s_m X_m,   w_m = b + (1 - b) (1/eta_m) / sum s_k/eta_k,   b = sum s_k eta_k/eta_max
+//! X_m - o w_m,   o = sum s_m X_m
+//! w_m = b + (1 - b) (1/eta_m) / sum s_k/eta_k,   b = sum s_k eta_k/eta_max
 //! ```
-//! Where all are shifted alike, thin fluid that slides along the level of a stiff one seems to tilt
-//! it, which makes the thin fluid slide: at a contrast of 1e6 a fluid at rest doubled the speed of its
-//! rounding with every step. `b` keeps nearly full cells of the stiff fluid as they were: there the
-//! slip of the thin one counts for little, that of the stiff one would for all.
+//! With equal shifts, thin fluid that slides along the interface of a stiff fluid seems to tilt it,
+//! and the tilt makes the thin fluid slide: at a contrast of 1e6, the speed of a fluid at rest
+//! (rounding) doubled with every step. In cells nearly full of the stiff fluid, `b` keeps the
+//! shifts nearly equal: there the slip of the thin fluid has little effect, and a shift of the
+//! stiff fluid would affect all.
 //!
-//! `rho_m` is a quadratic fit where particles carry their
-//! density; those of neighbouring cells help a little.
+//! `rho_m` is a quadratic fit if particles carry their density. Particles of neighbouring cells
+//! contribute to the fit with a small weight.
 
 use super::quadrature::Quadrature;
 use crate::composition::Content;
@@ -37,12 +40,14 @@ use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
 use crate::space::shape::GAUSS_3X3;
 
-/// Density of a neighbour's particle in a fit beside the cell's own, by its reference coordinates.
+/// Weight per volume of a neighbour's particle in a fit, relative to the cell's own particles, by
+/// its reference coordinates.
 ///
-/// Sixteen particles at random places determine six coefficients badly now and then; a few from
-/// next door, however lightly they count, mend that. On the steady vortex at 32 cells with random
-/// particles the velocity error is 2.3 times the particle-free one without them and 1.3 times with
-/// them; three times the weight, or no decay, makes it 3 and 10 times.
+/// Sixteen particles at random positions occasionally determine six coefficients badly; a few
+/// particles of neighbouring cells, even with a small weight, prevent that. On the steady vortex at
+/// 32 cells with random particles, the velocity error is 2.3 times the error without particles if
+/// neighbours do not contribute and 1.3 times if they do; with three times the weight, or without
+/// decay, it is 3 and 10 times.
 fn lent([x, y]: [f64; 2]) -> f64 {
     0.1 * ((2.0 - x * x - y * y) / 0.7).exp().min(1.0)
 }
@@ -54,16 +59,17 @@ pub struct Density {
     parts: Vec<Part>,
 }
 
-/// A material in a cell.
+/// One material in a cell.
 #[derive(Clone, Default)]
 struct Part {
     volume: f64,
-    /// Sum of volume times reference coordinates; then the centroid.
+    /// Sum of volume times reference coordinates; later the centroid.
     moment: [f64; 2],
     density: Fit,
 }
 
 impl Density {
+    /// Creates zero densities for all cells.
     pub fn new(mesh: &Mesh, neighbours: Neighbours, materials: usize) -> Self {
         Density {
             neighbours,
@@ -72,7 +78,8 @@ impl Density {
         }
     }
 
-    /// Evaluates all cells. `particles` sorted, `quadrature` of the same particles.
+    /// Computes the densities of all cells. `particles` must be sorted, and `quadrature` evaluated
+    /// with the same particles.
     pub fn update(
         &mut self,
         mesh: &Mesh,
@@ -98,20 +105,21 @@ impl Density {
         self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum()
     }
 
-    /// Gradient of the density inside a cell, in its reference coordinates.
+    /// Gradient of the density inside a cell, per reference coordinate.
     pub fn slope(&self, cell: usize) -> [f64; 2] {
         let points = || self.at_gauss[cell].iter().zip(GAUSS_3X3.iter());
         [0, 1].map(|c| points().map(|(d, g)| 3.0 * d * g.weight * g.r[c]).sum())
     }
 
-    /// Mass at each Gauss point as a share of the cell's area, reference coordinates, shape
-    /// functions.
+    /// Calls `f` for each Gauss point with its mass divided by the volume of the cell, its
+    /// reference coordinates and the shape functions.
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {
         for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
             f(g.weight * density, g.r, &g.shape.n);
         }
     }
 
+    /// Sums the volumes and moments of the materials, and collects the points of the fits.
     fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
         for part in &mut self.parts {
             (part.volume, part.moment) = (0.0, [0.0; 2]);
@@ -131,7 +139,7 @@ impl Density {
         }
     }
 
-    /// Lends particles of neighbouring cells to the fits of carried densities.
+    /// Adds particles of neighbouring cells to the fits of carried densities.
     fn help(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
         let Some(density) = &particles.density else { return };
         for (m, part) in self.parts.iter_mut().enumerate() {
@@ -147,10 +155,12 @@ impl Density {
         }
     }
 
+    /// Densities at the Gauss points of a mixed cell, after `gather` and `help`.
     fn mixed(&mut self, materials: &[Material], factors: &[f64]) -> [f64; 9] {
         let total: f64 = self.parts.iter().zip(factors).map(|(p, f)| p.volume * f).sum();
-        // Shares add up to one at every point only if the centroids' mean is the cell's centre:
-        // they are shifted by what is missing, the more the more easily their material moves.
+        // Shares add up to one at every point only if the mean of the centroids is the centre of
+        // the cell. The centroids are shifted by the difference, those of materials that move
+        // easily most.
         let (mut offset, mut give, mut held) = ([0.0; 2], 0.0, 0.0);
         let stiffest = materials.iter().map(|m| m.viscosity).fold(0.0, f64::max);
         for ((part, factor), material) in self.parts.iter_mut().zip(factors).zip(materials) {

@@ -1,42 +1,51 @@
-//! The biquadratic element: local unknowns, shape functions with derivatives, rates at a point, and
-//! the condensation of the centre node.
+//! This module defines the biquadratic element: local unknowns, shape functions with derivatives,
+//! rates at a point, and the condensation of the centre node.
 //!
-//! Local unknowns are ordered component by component: `9 c + a` for component `c` (u, v, w) of
-//! node `a`. `D` is 2 for the classical continuum, 3 with Cosserat rotation.
+//! Local unknowns are ordered component by component: `9 c + a` for component `c` (u, v, w) of node
+//! `a`. `D` is 2 for the classical continuum, 3 with Cosserat rotation.
 
 use crate::laws::rates::Rates;
 use crate::space::shape::{CENTRE, NODES, Shape};
 
-/// Local unknowns with rotation; classical elements use the first 18.
+/// Number of local unknowns with rotation; classical elements use the first 18.
 pub const LOCAL: usize = 3 * NODES;
-/// A full element matrix.
+/// Full element matrix.
 pub type Matrix = [[f64; LOCAL]; LOCAL];
-/// Velocities (and rotation) or forces of a cell's nodes.
+/// Velocities (and rotation) or forces of the nodes of a cell.
 pub type Nodal<const D: usize> = [[f64; D]; NODES];
 
-/// Shape functions with derivatives in the cell's own coordinates.
+/// Shape functions and their derivatives in physical coordinates at a point of a cell.
 #[derive(Clone, Copy)]
 pub struct PointShape {
+    /// Values.
     pub n: [f64; NODES],
+    /// Derivatives along x.
     pub gx: [f64; NODES],
+    /// Derivatives along y.
     pub gy: [f64; NODES],
 }
 
 impl PointShape {
+    /// Converts the reference derivatives of a cell of size `[hx, hy]`.
     pub fn new(s: &Shape, [hx, hy]: [f64; 2]) -> Self {
         PointShape { n: s.n, gx: s.d_xi.map(|d| d * 2.0 / hx), gy: s.d_eta.map(|d| d * 2.0 / hy) }
     }
 }
 
-/// The nodal unknowns differentiated at a point: `x[c]`, `y[c]` of component `c`, and `w` itself.
+/// Gradient of the nodal unknowns at a point: the derivatives `x[c]` and `y[c]` of component `c`,
+/// and the value `w` of the rotation.
 #[derive(Clone, Copy)]
 pub struct Gradient<const D: usize> {
+    /// Derivative of each component along x.
     pub(super) x: [f64; D],
+    /// Derivative of each component along y.
     pub(super) y: [f64; D],
+    /// Rotation rate; zero without rotation.
     pub(super) w: f64,
 }
 
 impl<const D: usize> Gradient<D> {
+    /// Gradient at a point of a cell with the nodal values `u`.
     pub fn at(s: &PointShape, u: &Nodal<D>) -> Self {
         let mut g = Gradient { x: [0.0; D], y: [0.0; D], w: 0.0 };
         for a in 0..NODES {
@@ -51,7 +60,7 @@ impl<const D: usize> Gradient<D> {
         g
     }
 
-    /// The rates of this gradient.
+    /// Deformation rates of this gradient.
     #[inline(always)]
     pub fn rates(&self) -> Rates {
         let gradient = [[self.x[0], self.y[0]], [self.x[1], self.y[1]]];
@@ -63,12 +72,12 @@ impl<const D: usize> Gradient<D> {
     }
 }
 
-/// Rates at a point of a cell with these nodal values.
+/// Deformation rates at a point of a cell with the nodal values `u`.
 pub fn rates<const D: usize>(s: &PointShape, u: &Nodal<D>) -> Rates {
     Gradient::at(s, u).rates()
 }
 
-/// Copies the blocks of components below the diagonal to those above.
+/// Copies the blocks of components below the diagonal to those above it.
 pub fn mirror<const D: usize>(k: &mut Matrix) {
     for i in NODES..NODES * D {
         for j in 0..i - i % NODES {
@@ -77,17 +86,17 @@ pub fn mirror<const D: usize>(k: &mut Matrix) {
     }
 }
 
-/// Nodes of a cell without its centre, in local order.
+/// Nodes of a cell except the centre, in local order.
 pub const SKELETON_NODES: [usize; 8] = [0, 1, 2, 3, 5, 6, 7, 8];
 
-/// A cell's matrix on its skeleton nodes, the lower triangle by node pairs `(k, l)`, `k >= l`, of
-/// [`SKELETON_NODES`], each a full block; see [`pair`].
+/// Condensed matrix of a cell on its skeleton nodes: a full `D x D` block for each pair `(k, l)`,
+/// `k >= l`, of [`SKELETON_NODES`], at the index [`pair`].
 pub type CellBlocks<const D: usize> = [[[f64; D]; D]; 36];
 
-/// What brings the centre node of a cell back that was condensed.
+/// Data that recover the condensed centre node of a cell.
 #[derive(Clone, Copy)]
 pub struct Centre<const D: usize> {
-    /// `A_cc^-1`
+    /// `A_cc^-1`.
     pub inverse: [[f64; D]; D],
     /// `A_cc^-1 A_cb`, by skeleton node.
     pub coupling: [[[f64; D]; D]; 8],
@@ -98,8 +107,8 @@ pub const fn pair(k: usize, l: usize) -> usize {
     k * (k + 1) / 2 + l
 }
 
-/// Condenses the centre node of a cell: `A_bb - A_bc A_cc^-1 A_cb`. `a` must be symmetric; unknowns
-/// with a zero diagonal at the centre become idle.
+/// Condenses the centre node of a cell: `A_bb - A_bc A_cc^-1 A_cb`. `a` must be symmetric. A zero
+/// diagonal entry at the centre (an unknown that no material acts on) is replaced by one.
 pub fn condense<const D: usize>(a: &Matrix) -> (CellBlocks<D>, Centre<D>) {
     let at = |i: usize, ci: usize, j: usize, cj: usize| a[NODES * ci + i][NODES * cj + j];
     let mut centre = nalgebra::SMatrix::<f64, D, D>::from_fn(|r, c| at(CENTRE, r, CENTRE, c));
@@ -133,7 +142,7 @@ pub fn condense<const D: usize>(a: &Matrix) -> (CellBlocks<D>, Centre<D>) {
     (blocks, Centre { inverse, coupling })
 }
 
-/// Inverse of a small symmetric positive definite matrix (Cholesky by hand: `D` is 2 or 3).
+/// Inverse of a small symmetric positive definite matrix by Cholesky factorisation (`D` is 2 or 3).
 fn invert<const D: usize>(a: &nalgebra::SMatrix<f64, D, D>) -> nalgebra::SMatrix<f64, D, D> {
     let mut l = nalgebra::SMatrix::<f64, D, D>::zeros();
     for j in 0..D {

@@ -1,5 +1,5 @@
-//! What a cell does: the laws of its materials at its integration points, mixtures and laminates,
-//! from what [`composition`](crate::composition) says is there.
+//! This module evaluates the laws of the materials at the integration points of a cell, with
+//! mixtures and laminates, from the [`composition`](crate::composition) of the cell.
 
 use super::element::{PointShape, rates};
 use super::laminate::{self, Cut};
@@ -21,17 +21,8 @@ use crate::threads::Divisible;
 
 /// Rates and pressure of the last iterate, for laws that depend on them.
 pub trait LastFlow: Sync {
-    /// At reference coordinates `r` of a cell, in the plan's units.
+    /// Rates and pressure at the reference coordinates `r` of a cell, in the plan's units.
     fn at(&self, cell: usize, r: [f64; 2]) -> (Rates, f64);
-}
-
-/// There is no iterate yet: no rates, no pressure.
-pub struct NoFlow;
-
-impl LastFlow for NoFlow {
-    fn at(&self, _: usize, _: [f64; 2]) -> (Rates, f64) {
-        (Rates::default(), 0.0)
-    }
 }
 
 impl<const D: usize> LastFlow for (&Mesh, &Flow<D>) {
@@ -44,35 +35,49 @@ impl<const D: usize> LastFlow for (&Mesh, &Flow<D>) {
     }
 }
 
-/// The law of a material whose particles all are alike.
+/// Law of a material whose particles are all alike.
 pub fn uniform(m: &Material) -> PointLaw {
     m.law.at(&Here::at_rest(m.viscosity, &Orientation::default()))
 }
 
-/// What cells are evaluated from.
+/// Inputs of the evaluation of cells.
 #[derive(Clone, Copy)]
 pub struct Evaluation<'a> {
+    /// Rule that determines the integration points.
     pub rule: Rule,
+    /// The mesh.
     pub mesh: &'a Mesh,
+    /// Particles, sorted by cell.
     pub particles: &'a Particles,
+    /// The materials.
     pub materials: &'a [Material],
+    /// Properties of each material that the composition needs.
     pub kinds: &'a [Kind],
+    /// Content of each cell.
     pub content: &'a [Content],
+    /// Factor on each material's volume in cut cells.
     pub factors: &'a [f64],
+    /// Last iterate, for laws that depend on rates or pressure.
     pub flow: &'a dyn LastFlow,
 }
 
-/// What some consecutive cells have, to be written.
+/// Mutable data of consecutive cells.
 pub struct CellsMut<'a> {
+    /// Number of materials.
     pub materials: usize,
+    /// Integration points, nine per cell.
     pub points: &'a mut [IntegrationPoint],
+    /// Stiffness of each cut cell.
     pub cut: &'a mut [Option<Box<CutStiffness>>],
+    /// Mean viscosity of each cell.
     pub mean_viscosity: &'a mut [f64],
+    /// Mean inverse bulk viscosity of each cell.
     pub compliance: &'a mut [f64],
+    /// Volume fractions, by cell and material.
     pub fractions: &'a mut [f64],
 }
 
-/// What one cell has, to be written.
+/// Mutable data of one cell.
 pub struct CellMut<'a> {
     points: &'a mut [IntegrationPoint],
     cut: &'a mut Option<Box<CutStiffness>>,
@@ -102,7 +107,7 @@ impl Divisible for CellsMut<'_> {
 }
 
 impl CellsMut<'_> {
-    /// The `k`th of these cells.
+    /// Data of the `k`th of these cells.
     pub fn cell(&mut self, k: usize) -> CellMut<'_> {
         CellMut {
             points: &mut self.points[9 * k..9 * k + 9],
@@ -114,17 +119,17 @@ impl CellsMut<'_> {
     }
 }
 
-/// How the materials of a cell lie.
+/// Arrangement of the materials of a cell.
 #[expect(
     clippy::large_enum_variant,
     reason = "there is one at a time, and a box would be allocated"
 )]
 enum Form {
-    /// Two with an interface.
+    /// Two materials separated by an interface.
     Cut { interface: Interface, between: [usize; 2] },
     /// Drops in a material of the viscosity `around`.
     Drops { around: f64 },
-    /// Unknown.
+    /// No known arrangement.
     Mixture,
 }
 
@@ -147,6 +152,7 @@ impl Evaluation<'_> {
         }
     }
 
+    /// Evaluates a mixed cell.
     fn mix(
         &self,
         cell: usize,
@@ -168,8 +174,9 @@ impl Evaluation<'_> {
         self.points(cell, out, scratch, mixture);
         if let Form::Cut { interface, between } = form {
             let cut = self.laminate(cell, &interface, between, scratch);
-            // In parallel: the stiff part counts. With the mixture's mean as the
-            // scale of the penalty layers of contrast 1e8 do not converge.
+            // The two sides resist stretching in parallel, so the stiff side determines the scale
+            // of the penalty. With the mean of the mixture as this scale, layers of contrast 1e8 do
+            // not converge.
             let arithmetic = self.arithmetic_viscosity(scratch);
             *out.mean_viscosity = cut.rest * *out.mean_viscosity + (1.0 - cut.rest) * arithmetic;
             *out.cut = Some(match kept {
@@ -182,7 +189,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// What two materials form in a gathered cell.
+    /// Arrangement of the materials in a gathered cell.
     fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
         let viscosity: [f64; 2] = match present(scratch.volumes()) {
             Some(between) => between.map(|m| self.viscosity_in_cell(cell, m, scratch)),
@@ -204,7 +211,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// The law of a material at a point of a cell.
+    /// Law of a material at a point of a cell.
     fn law(
         &self,
         (cell, r): (usize, [f64; 2]),
@@ -240,19 +247,19 @@ impl Evaluation<'_> {
         CutStiffness { matrix, rest: 1.0 - interface.trust }
     }
 
-    /// Mean viscosity of one material's law in the cell's middle.
+    /// Mean viscosity of the law of one material at the centre of the cell.
     fn viscosity_in_cell(&self, cell: usize, m: usize, scratch: &Gathered) -> f64 {
         let eta = self.viscosity(m, [0.0; 2], scratch);
         self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m)).shear.mean()
     }
 
-    /// Mean viscosity of the cell's materials by volume.
+    /// Mean of the viscosities of the cell's materials, weighted by volume.
     fn arithmetic_viscosity(&self, scratch: &Gathered) -> f64 {
         let total: f64 = scratch.volumes().iter().sum();
         scratch.volumes().iter().zip(self.materials).map(|(v, m)| v / total * m.viscosity).sum()
     }
 
-    /// Law of one material over the whole cell.
+    /// Law of one material at the points of [`GAUSS_6X6`].
     fn law_in_cell(&self, cell: usize, m: usize, scratch: &Gathered) -> [PointLaw; SUBPOINTS] {
         let orientation = scratch.cell_orientation(m);
         let material = &self.materials[m];
@@ -265,7 +272,7 @@ impl Evaluation<'_> {
         })
     }
 
-    /// Fills the nine points of a cell, its fractions and means.
+    /// Fills the nine points of a cell, its volume fractions and its means.
     fn points(&self, cell: usize, out: &mut CellMut, scratch: &Gathered, empty: Mixture) {
         out.fractions.fill(0.0);
         (*out.mean_viscosity, *out.compliance) = (0.0, 0.0);
@@ -288,7 +295,7 @@ impl Evaluation<'_> {
     }
 }
 
-/// The two materials that have a volume; `None` if there are more or fewer.
+/// The two materials with a nonzero volume; `None` if there are more or fewer.
 fn present(volumes: &[f64]) -> Option<[usize; 2]> {
     let mut present = (0..volumes.len()).filter(|&m| volumes[m] > 0.0);
     match (present.next(), present.next(), present.next()) {
@@ -297,8 +304,8 @@ fn present(volumes: &[f64]) -> Option<[usize; 2]> {
     }
 }
 
-/// A particle as an integration point of a cell whose particles have the volume `total`, and its
-/// viscosity.
+/// Viscosity of a particle, and the particle as an integration point of a cell whose particles have
+/// the volume `total`.
 pub fn particle_point(
     (mesh, cell): (&Mesh, usize),
     (particles, p): (&Particles, usize),

@@ -1,8 +1,8 @@
-//! Stiffness of a cell cut by an interface, as a laminate: what shears along the interface is in
-//! series, what stretches along it in parallel.
+//! This module computes the stiffness of a cell cut by an interface, as a laminate: the two sides
+//! are in series in shear along the interface and in parallel in stretching along it.
 //!
-//! A biquadratic velocity cannot kink inside a cell. Integrated as it stands it locks: the soft
-//! part may not move where the stiff part does not. With the normal `n` and the tangent `t` of the
+//! A biquadratic velocity cannot have a kink inside a cell. Integrated directly, it locks: the soft
+//! part cannot move where the stiff part does not. With the normal `n` and the tangent `t` of the
 //! interface, `e = -2 D_tt` and `g = 2 D_nt`, the true flow has
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! sigma_nn = -p + ... continuous.
 //! ```
 //! Every law is `a e^2 + b (g + k e)^2` with `b = S_gg`, `k = S_eg / b`, `a = S_ee - S_eg^2 / b`
-//! (`a = b = eta`, `k = 0` if isotropic). The cell's power is a sum of squares,
+//! (`a = b = eta`, `k = 0` if isotropic). The power of the cell is a sum of squares,
 //!
 //! ```text
 //! max over s in P1 of  2 int s (g + k e) - int s^2 / b      shear stress s along the interface
@@ -18,31 +18,31 @@
 //! + c b_h int |(1 - P)(g + k e)|^2 + c a_h int |(1 - R) e|^2 + d beta_h int tr(D)^2
 //! ```
 //! with integrals of a, b, k over the true shape of either side, `P` the L2 projection on P1, and
-//! harmonic means `b_h`, `a_h`, `beta_h`: what the fits leave out is held by the softer part.
-//! All terms are squares with positive weights, so the matrix is positive semi-definite whatever
-//! the particles do, and definite but for rigid motions.
+//! harmonic means `b_h`, `a_h`, `beta_h`: the softer part resists the remainders of the fits. All
+//! terms are squares with positive weights. For any positions of the particles the matrix is
+//! therefore positive semi-definite, and its null space contains only rigid motions.
 //!
-//! **Pressure.** An incompressible flow has `D_nn - D_tt = -2 D_tt`, yet the choice decides what the
-//! multiplier of `div u` means. With `D_nn - D_tt` it is the mean stress, which jumps with the
-//! viscosity, and a linear pressure cannot jump inside a cell; with `-2 D_tt` it is `-sigma_nn`,
-//! which does not. With exact geometry, layers of contrast 1e3 stretched along themselves err by
-//! 0.2e-3 in place of 20e-3 at 64 cells.
+//! **Pressure.** An incompressible flow has `D_nn - D_tt = -2 D_tt`, yet the choice determines the
+//! meaning of the multiplier of `div u`. With `D_nn - D_tt` it is the mean stress, which jumps with
+//! the viscosity, and a linear pressure cannot jump inside a cell; with `-2 D_tt` it is
+//! `-sigma_nn`, which is continuous. With exact geometry, the error of layers of contrast 1e3
+//! stretched along themselves is 0.2e-3 instead of 20e-3 at 64 cells.
 //!
 //! **Uniform limit.** With the contrast `r = min(a_h / a_mean, b_h / b_mean)`, `e` is
 //! `D_nn - D_tt - (1 - r^2) tr D`, `c = 0.3 + 0.7 r`, `d = 3 - 2 r`: equal laws give the standard
 //! matrix, term by term.
 //!
-//! Measured at 64 cells, 16 jittered particles each, relative velocity error x 1e-3, mean of three
-//! seeds, against the local harmonic mixture: wall in a cell 1e6 2.3 (4.9), inclusions of 1e3 and
-//! 1e6 2.0 and 2.1 (2.1, 2.3), of 0.1, 0.01, 1e-3 and 1e-8 0.7, 2.1, 12 and 20 (4.9, 11, 15 and
-//! 17), layers of 1e3 sheared 1.2 (1.2), stretched along themselves 7.3 (3.0): there, and in
-//! nearly empty holes, the noise of the geometry makes the mixture the better one. `c = 1` makes
+//! Relative velocity error x 1e-3 at 64 cells with 16 jittered particles each, mean of three seeds
+//! (in brackets: local harmonic mixture): wall in a cell 1e6 2.3 (4.9), inclusions of 1e3 and 1e6
+//! 2.0 and 2.1 (2.1, 2.3), of 0.1, 0.01, 1e-3 and 1e-8 0.7, 2.1, 12 and 20 (4.9, 11, 15 and 17),
+//! layers of 1e3 sheared 1.2 (1.2), stretched along themselves 7.3 (3.0). In the last case, and in
+//! nearly empty holes, the noise of the geometry makes the mixture more accurate. `c = 1` makes the
 //! errors of strong inclusions 1.7 times as large, `d = 10` 1.5 times (exact geometry).
 //!
 //! **Sheets** of 0.25, 0.5 and 0.8 cells, 1e3 times as stiff, stretched along themselves keep 0.52,
-//! 0.94 and 0.83 of their strength along the mesh, 0.67, 0.71 and 0.63 at 30 degrees to it.
-//! Neighbours' strips that do not meet leak: a share smeared evenly over each cell keeps 0.95,
-//! 0.91 and 0.81 along the mesh, but 0.04 at 30 degrees.
+//! 0.94 and 0.83 of their strength along the mesh, 0.67, 0.71 and 0.63 at 30 degrees to it. Strips
+//! of neighbouring cells that do not meet weaken the sheet: a share distributed evenly over each
+//! cell keeps 0.95, 0.91 and 0.81 along the mesh, but 0.04 at 30 degrees.
 
 use super::element::PointShape;
 use crate::composition::interface::Interface;
@@ -50,41 +50,45 @@ use crate::laws::point::{PointLaw, Sym2};
 use crate::space::measure::CellMeasure;
 use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
 
-/// Velocity unknowns of a cell, component by component.
+/// Number of velocity unknowns of a cell, ordered component by component.
 const N: usize = 2 * NODES;
-/// A number for every velocity unknown: a linear form.
+/// A linear form of the velocity unknowns.
 type Row = [f64; N];
-/// Stiffness on the velocity of a cell.
+/// Stiffness matrix on the velocities of a cell.
 pub type VelocityMatrix = [[f64; N]; N];
 
-/// c and d at infinite contrast.
+/// Coefficient `c` at infinite contrast.
 const LOOSE: f64 = 0.3;
+/// Coefficient `d` at infinite contrast.
 const DILATION: f64 = 3.0;
 
 /// Largest `a` in units of the harmonic means. In a chain of cut cells whose soft side is far
-/// softer, only the stiff side's own tension resists, and what particles say of its thickness is
-/// noisy: without a limit layers of contrast 1e3 stretched along themselves err by 13e-3 at 64
-/// cells and a hole of 1e-8 by 0.19; with 100, by 7e-3 and 0.02; with 10, by 4e-3 and 0.016, but
-/// then holes of 0.01 err by 8e-3 in place of 2e-3. For convex soft sides alone 1000 and 30 both
-/// make holes of 1e-3 err by 12.5e-3 in place of 10.2e-3. Stiff sheets below a cell have no limit:
-/// with it they keep a hundredth to a quarter of their strength.
+/// softer, only the tension of the stiff side resists, and its thickness, measured from particles,
+/// is noisy. Without a limit the error of layers of contrast 1e3 stretched along themselves is
+/// 13e-3 at 64 cells and that of a hole of 1e-8 is 0.19; with 100, 7e-3 and 0.02; with 10, 4e-3 and
+/// 0.016, but then the error of holes of 0.01 is 8e-3 instead of 2e-3. If the limit applies to
+/// convex soft sides alone, the error of holes of 1e-3 is 12.5e-3 instead of 10.2e-3 with both 1000
+/// and 30. Stiff sheets thinner than a cell have no limit: with it they keep a hundredth to a
+/// quarter of their strength.
 const TENSION: f64 = 100.0;
 
-/// A cell cut in two.
+/// A cell cut into two sides.
 pub struct Cut<'a> {
+    /// The interface in the cell.
     pub interface: &'a Interface,
-    /// Laws of either side at the points of [`GAUSS_6X6`].
+    /// Laws of the two sides at the points of [`GAUSS_6X6`].
     pub sides: &'a [[PointLaw; SUBPOINTS]; 2],
+    /// Measure of the cell.
     pub cell: CellMeasure,
 }
 
-/// The directions of `e` and `g` among `(D_xx - D_yy, 2 D_xy)`.
+/// Directions of `e` and `g` in the space of `(D_xx - D_yy, 2 D_xy)`.
 struct Frame {
     e: [f64; 2],
     g: [f64; 2],
     /// Tangent.
     t: [f64; 2],
-    /// `1 - r^2`: how much of the trace `e` lacks.
+    /// `1 - r^2`, the factor of the trace in `e`.
     lack: f64,
 }
 
@@ -94,7 +98,7 @@ impl Frame {
         Frame { e: [c, s], g: [-s, c], t: [-ny, nx], lack: 0.0 }
     }
 
-    /// `(a, 1/b, k)` of a law.
+    /// The coefficients `(a, 1/b, k)` of a law.
     fn coefficients(&self, s: &Sym2) -> (f64, f64, f64) {
         let bilinear = |x: &[f64; 2], y: &[f64; 2]| {
             s.a * x[0] * y[0] + s.b * x[1] * y[1] + s.c * (x[0] * y[1] + x[1] * y[0])
@@ -104,7 +108,7 @@ impl Frame {
         (ee - eg * eg / gg, 1.0 / gg, eg / gg)
     }
 
-    /// A rate `x (D_xx - D_yy) + y (2 D_xy) + z tr D` of the nodal velocities.
+    /// The rate `x (D_xx - D_yy) + y (2 D_xy) + z tr D` as a linear form of the nodal velocities.
     fn row(s: &PointShape, [x, y]: [f64; 2], z: f64) -> Row {
         let mut row = [0.0; N];
         for a in 0..NODES {
@@ -151,7 +155,7 @@ impl Means {
     }
 }
 
-/// Replaces the mixed `a` by that of sides none of which exceeds `limit`.
+/// Replaces the mixed `a` by a mean in which neither side exceeds `limit`.
 fn limit_tension(cut: &Cut, frame: &Frame, limit: f64, at: &mut [[f64; 3]; SUBPOINTS]) {
     for (q, at) in at.iter_mut().enumerate() {
         let share = cut.interface.share[q];
@@ -190,12 +194,13 @@ fn coefficients(cut: &Cut, frame: &Frame) -> ([[f64; 3]; SUBPOINTS], Means) {
     (at, means)
 }
 
-/// Stiffness of a cut cell.
+/// Stiffness matrix of a cut cell.
 pub fn matrix(cut: &Cut) -> VelocityMatrix {
     let mut frame = Frame::new(cut.interface.normal);
     let (mut at, means) = coefficients(cut, &frame);
     let (a_h, b_h) = (1.0 / means.a_inverse, 1.0 / means.b_inverse);
-    // Measured from the softest response of the cell: equal layered laws keep theirs.
+    // The limit is relative to the softest response of the cell, so equal layered laws are not
+    // limited.
     let limit = TENSION * a_h.max(b_h);
     if means.a > 0.01 * limit && !cut.interface.sheet {
         limit_tension(cut, &frame, limit, &mut at);
@@ -235,7 +240,7 @@ pub fn matrix(cut: &Cut) -> VelocityMatrix {
             add_row(&mut stretch[i], g.weight * a * u[i], &e);
         }
     }
-    // Of the whole cell: the 3 x 3 rule is exact.
+    // Integrals over the whole cell, for which the 3 x 3 rule is exact.
     let mut fitted = [[0.0; N]; 3];
     let shape = GAUSS_3X3.each_ref().map(|g| PointShape::new(&g.shape, cut.cell.size));
     let sheared = shape.each_ref().map(|s| {
@@ -285,11 +290,11 @@ fn add_row(sum: &mut Row, f: f64, row: &Row) {
     }
 }
 
-/// `k += w row^T row`, of which only the lower triangle will be read.
+/// Adds `w row^T row` to `k`, of which only the lower triangle is used.
 #[inline(always)]
 fn add_square(k: &mut VelocityMatrix, w: f64, row: &Row) {
     for (i, (line, r)) in k.iter_mut().zip(row).enumerate() {
-        // Whole halves of a line vectorise; the lower triangle lies in them.
+        // Loops over whole halves of a row vectorise; they contain the lower triangle.
         let length = if i < NODES { NODES } else { N };
         for (s, v) in line[..length].iter_mut().zip(&row[..length]) {
             *s += w * r * v;
@@ -297,8 +302,8 @@ fn add_square(k: &mut VelocityMatrix, w: f64, row: &Row) {
     }
 }
 
-/// Replaces the lower triangle of a small positive definite matrix by its Cholesky factor, and
-/// the rows by `L^-1 rows`. A pivot that rounding ate is replaced by one that rounding cannot.
+/// Replaces the lower triangle of a small positive definite matrix by its Cholesky factor, and the
+/// rows by `L^-1 rows`. A pivot lost to rounding is replaced by a small positive one.
 fn lower_solve<const R: usize>(m: &mut [[f64; R]; R], rows: &mut [Row; R]) {
     for i in 0..R {
         for j in 0..=i {
@@ -313,7 +318,7 @@ fn lower_solve<const R: usize>(m: &mut [[f64; R]; R], rows: &mut [Row; R]) {
     }
 }
 
-/// `L^-T rows`
+/// Replaces the rows by `L^-T rows`.
 fn upper_solve<const R: usize>(l: &[[f64; R]; R], rows: &mut [Row; R]) {
     for i in (0..R).rev() {
         for j in i + 1..R {
@@ -358,7 +363,7 @@ mod tests {
         })
     }
 
-    /// A straight interface through the cell, the second material above it.
+    /// A straight interface through the cell, with the second material above it.
     fn straight(angle: f64, offset: f64) -> Interface {
         let normal = [-angle.sin(), angle.cos()];
         let share = std::array::from_fn(|q| {
@@ -404,7 +409,7 @@ mod tests {
         }
     }
 
-    /// The velocity gradient of a stretch along (`s = 1`) or a shear of (`s = 0`) the interface.
+    /// Velocity gradient of a stretch along the interface (`s = 1`) or a shear along it (`s = 0`).
     fn along(angle: f64, s: f64) -> [[f64; 2]; 2] {
         let (t, n) = ([angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]);
         std::array::from_fn(|i| {
@@ -421,7 +426,7 @@ mod tests {
                 let phi: f64 =
                     GAUSS_6X6.iter().zip(interface.share).map(|(g, s)| g.weight * s).sum();
                 let area = SIZE[0] * SIZE[1];
-                // Beyond the limit the stiff side pulls with a part of its strength.
+                // Beyond the limit only a part of the strength of the stiff side acts.
                 let limit = TENSION / (1.0 - phi + phi / contrast);
                 let mean = (1.0 - phi) * limit.min(1.0) + phi * contrast.min(limit);
                 let stretched = power(&k, along(angle, 1.0)) / (4.0 * mean * area);
@@ -434,8 +439,9 @@ mod tests {
         }
     }
 
-    /// Three by three cells of random particles, of which those beyond a random line, or in the
-    /// central cell `few` alone, are of the second material.
+    /// Interface in the central one of three by three cells of random particles. The second
+    /// material is beyond a random line or, with `few`, only the first `few` particles of the
+    /// central cell.
     fn random_interface(seed: u64, few: Option<usize>) -> Option<Interface> {
         let axis = |h: f64| Axis::new((0..4).map(|k| k as f64 * h).collect(), false);
         let mesh = Mesh::new(axis(SIZE[0]), axis(SIZE[1]));
@@ -494,7 +500,7 @@ mod tests {
                         values.sort_by(f64::total_cmp);
                         let rounding = 1e-12 * values[N - 1];
                         assert!(values[0] > -rounding, "{seed} {few:?} {exponent}: {values:?}");
-                        // Three rigid motions, and nothing else, cost nothing.
+                        // Only the three rigid motions have zero power.
                         assert!(values[2] < rounding, "{seed} {few:?} {exponent}: {values:?}");
                         assert!(values[3] > 1e-4 * soft, "{seed} {few:?} {exponent}: {values:?}");
                     }

@@ -1,4 +1,4 @@
-//! Element matrices of all cells, computed again only where something changed.
+//! This module computes the element matrices of all cells, again only for cells that changed.
 
 use super::element::{
     CellBlocks, Centre, LOCAL, Matrix, Nodal, PointShape, condense, mirror, pair,
@@ -15,34 +15,39 @@ use crate::space::mesh::Mesh;
 use crate::space::shape::{CENTRE, NODES, SIDE_NODES};
 use crate::threads;
 
-/// Penalty `r` of the augmented Lagrangian in units of the cell's viscosity.
+/// Penalty `r` of the augmented Lagrangian in units of the viscosity of the cell.
 const PENALTY: f64 = 1e6;
 
-/// Cells that are worth a task of their own.
+/// Largest number of cells per task.
 const GRAIN: usize = 16;
 
-/// What the corrections need of a cell besides its blocks.
+/// Data of a cell that the corrections need besides its blocks.
 #[derive(Clone, Copy)]
 pub struct CellMatrix<const D: usize> {
+    /// Data that recover the condensed centre node.
     pub centre: Centre<D>,
-    /// Of the matrix without the penalty.
+    /// Diagonal of the element matrix without the penalty.
     pub diagonal: Nodal<D>,
-    /// `W = (C + Mp / (r eta))^-1`
+    /// `W = (C + Mp / (r eta))^-1`, for the pressures `1, xi, eta`.
     pub penalty: [f64; 3],
 }
 
 /// The matrices of all cells.
 pub struct Matrices<const D: usize> {
+    /// Data of each cell for the corrections.
     pub cells: Vec<CellMatrix<D>>,
-    /// Of the skeleton, centres condensed and all terms added: what is factored.
+    /// Blocks of each cell on the skeleton, with the centre condensed and all terms added; these
+    /// are factored.
     pub blocks: Vec<CellBlocks<D>>,
-    /// Of cells whose coupling exceeds their shear viscosity.
+    /// Projected coupling of the cells whose coupling viscosity exceeds the shear viscosity.
     pub rotation: Vec<Option<Box<RotationModes>>>,
+    /// Content that the matrix of each cell was computed for.
     built_from: Vec<Content>,
-    /// Those that were computed at the last update.
+    /// Matrices computed in the last update, in ascending order of the cells.
     fresh: Vec<Fresh<D>>,
 }
 
+/// A newly computed matrix of a cell.
 struct Fresh<const D: usize> {
     cell: usize,
     matrix: CellMatrix<D>,
@@ -50,13 +55,18 @@ struct Fresh<const D: usize> {
     rotation: Option<Box<RotationModes>>,
 }
 
-/// What matrices are made from.
+/// Inputs of the element matrices.
 #[derive(Clone, Copy)]
 pub struct Ingredients<'a, const D: usize> {
+    /// The mesh.
     pub mesh: &'a Mesh,
+    /// Incidence of cells and nodes.
     pub incidence: &'a Incidence,
+    /// Boundary conditions.
     pub constraints: &'a Constraints<D>,
+    /// Integration points with their laws.
     pub quadrature: &'a Quadrature,
+    /// Terms that only some scenes have.
     pub terms: &'a Terms,
 }
 
@@ -71,6 +81,7 @@ impl<const D: usize> CellMatrix<D> {
 impl<const D: usize> Matrices<D> {
     const NO_BLOCKS: CellBlocks<D> = [[[0.0; D]; D]; 36];
 
+    /// Creates zero matrices for a number of cells; the first update computes all of them.
     pub fn new(cells: usize) -> Self {
         Matrices {
             cells: vec![CellMatrix::ZERO; cells],
@@ -81,11 +92,11 @@ impl<const D: usize> Matrices<D> {
         }
     }
 
-    /// Computes the matrices of cells whose content changed, and calls `changed` for those that
-    /// are not, bit for bit, what they were.
+    /// Computes the matrices of the cells whose content changed, and calls `changed` for each cell
+    /// whose blocks differ in any bit from the previous ones.
     pub fn update(&mut self, from: Ingredients<D>, mut changed: impl FnMut(usize)) {
         self.fresh.clear();
-        // Terms of faces come on top of what the content says.
+        // Terms on faces are not part of the content: cells with such a term are always computed.
         let faces = || from.terms.on_faces().flat_map(|t| t.faces());
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
@@ -122,6 +133,7 @@ impl<const D: usize> Matrices<D> {
 }
 
 impl<const D: usize> Fresh<D> {
+    /// Computes the matrix of the cell, without the terms on faces.
     fn build(&mut self, from: Ingredients<D>) {
         let Ingredients { mesh, incidence, constraints, quadrature, terms } = from;
         let cell = self.cell;
@@ -129,7 +141,7 @@ impl<const D: usize> Fresh<D> {
         let size = measure.size;
         let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
         let cut = quadrature.cut(cell);
-        // What a stiff rotation adds to the viscosity of a flow on the scale of the cell.
+        // Viscosity that a stiff rotation adds to a flow that varies over the size of the cell.
         let (mut turning, thickness) = (0.0, size[0].min(size[1]));
         quadrature.for_points(cell, |p, shape| {
             let law = p.law.without_excess();
@@ -145,7 +157,7 @@ impl<const D: usize> Fresh<D> {
         if let Some(cut) = cut {
             add_cut_stiffness(&mut k, cut);
         }
-        // In the room of those before.
+        // Reuse the memory of the previous modes.
         let before = self.rotation.take();
         if D == 3
             && let Some(modes) = RotationModes::new(quadrature, cell, measure)
@@ -186,7 +198,7 @@ impl<const D: usize> Fresh<D> {
         (self.blocks, self.matrix.centre) = condense(&k);
     }
 
-    /// Adds the term of a face, whose nodes the skeleton has all.
+    /// Adds a term on a face; all nodes of a face are on the skeleton.
     fn add_face(&mut self, from: Ingredients<D>, term: &dyn FaceTerm, index: usize) {
         let face = term.faces()[index];
         let nodes = &from.incidence.nodes[face.cell];
@@ -195,7 +207,7 @@ impl<const D: usize> Fresh<D> {
                 self.matrix.diagonal[a][c] += term.entry(index, [k, k], [c, c]);
             }
             for (l, &b) in SIDE_NODES[face.side].iter().enumerate().take(k + 1) {
-                // Local nodes without the centre.
+                // Indices among the local nodes without the centre.
                 let [i, j] = [a, b].map(|n| n - usize::from(n > CENTRE));
                 let block = &mut self.blocks[pair(i, j)];
                 for r in 0..2 {

@@ -1,5 +1,5 @@
-//! Solving for velocity, rotation and pressure: integration points, terms, element matrices, the
-//! sparse factor, corrections.
+//! This module solves for velocity, rotation and pressure. It holds the integration points, the
+//! terms of the equations, the element matrices, the sparse factor and the corrections.
 
 mod correction;
 pub mod density;

@@ -1,4 +1,4 @@
-//! Integration points, and the stiffness of cells that an interface cuts.
+//! This module defines integration points and the stiffness of cells cut by an interface.
 
 use super::laminate::VelocityMatrix;
 use crate::laws::point::PointLaw;
@@ -6,11 +6,12 @@ use crate::laws::point::PointLaw;
 /// One integration point of a cell.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IntegrationPoint {
-    /// The law there.
+    /// Law at the point.
     pub law: PointLaw,
-    /// Density, of particles as integration points; Gauss points have theirs from `weight`.
+    /// Density, if particles or fields give the integration points; for the Gauss points of mixed
+    /// cells see [`density`](super::density).
     pub density: f64,
-    /// Share of the cell's volume.
+    /// Share of the volume of the cell.
     pub weight: f64,
     /// Reference coordinates.
     pub r: [f64; 2],
@@ -19,8 +20,8 @@ pub struct IntegrationPoint {
 /// Viscous stiffness of a cell cut by an interface.
 #[derive(Clone)]
 pub struct CutStiffness {
-    /// On the velocities of the cell's nodes.
+    /// Stiffness matrix on the velocities of the cell's nodes.
     pub matrix: VelocityMatrix,
-    /// Share of the viscosity that the integration points still have.
+    /// Fraction of the viscosity that remains at the integration points.
     pub rest: f64,
 }

@@ -1,4 +1,4 @@
-//! The discrete problem on one mesh, and the vectors that its solution works with.
+//! This module defines the discrete problem on one mesh and the vectors used to solve it.
 
 use super::element::Nodal;
 use super::matrices::Matrices;
@@ -14,62 +14,81 @@ use crate::space::shape::NODES;
 use crate::threads;
 use std::sync::Arc;
 
-/// Cells, and nodes, that are worth a task of their own.
+/// Largest number of cells per task.
 pub(super) const CELL_GRAIN: usize = 128;
+/// Largest number of nodes per task.
 pub(super) const NODE_GRAIN: usize = 2048;
 
 /// The discrete problem on one mesh: boundary conditions, element matrices, factor.
 pub struct Stokes<const D: usize> {
+    /// The mesh.
     pub(super) mesh: Arc<Mesh>,
+    /// Incidence of cells and nodes.
     pub(super) incidence: Arc<Incidence>,
+    /// Boundary conditions.
     pub(super) constraints: Constraints<D>,
+    /// Element matrices.
     pub(super) matrices: Matrices<D>,
+    /// Sparse factor of the skeleton matrix.
     pub(super) factor: Multifrontal<D>,
-    /// Unaugmented diagonal, per node, and one over it.
+    /// Diagonal of the matrix without augmentation, by node.
     pub(super) diagonal: Vec<[f64; D]>,
+    /// Inverse of `diagonal`.
     pub(super) inverse_diagonal: Vec<[f64; D]>,
+    /// Instruction set of the kernels.
     pub(super) simd: Simd,
+    /// Vectors of the corrections.
     pub(super) work: Work<D>,
 }
 
-/// What drives a solution.
+/// Loads that drive a solution.
 #[derive(Clone, Copy)]
 pub struct Loads<'a, const D: usize> {
     /// Force (and couple) at each node.
     pub nodal: &'a [[f64; D]],
+    /// Terms that only some scenes have.
     pub terms: &'a Terms,
 }
 
-/// What a solution is asked for.
+/// Inputs of a solution.
 pub(super) struct Given<'a, const D: usize> {
+    /// Integration points with their laws.
     pub(super) quadrature: &'a Quadrature,
+    /// Loads.
     pub(super) loads: Loads<'a, D>,
+    /// Stopping criteria.
     pub(super) stopping: Stopping,
 }
 
-/// Vectors of the corrections, kept from one solution to the next.
+/// Vectors of the corrections, reused from one solution to the next.
 #[derive(Default)]
 pub(super) struct Work<const D: usize> {
+    /// Residual of the current flow.
     pub(super) residual: Residual<D>,
-    /// What each cell has for its nodes.
+    /// Contribution of each cell to its nodes.
     pub(super) shares: Vec<Share<D>>,
     /// Right-hand side and solution on the skeleton.
     pub(super) skeleton: Vec<f64>,
+    /// The current correction.
     pub(super) correction: Correction<D>,
-    /// Corrections of this solution, of orthonormal divergence; the first `kept` are valid.
+    /// Corrections of this solution, with orthonormal divergences; the first `kept` are valid.
     pub(super) directions: Vec<Correction<D>>,
+    /// Number of valid `directions`.
     pub(super) kept: usize,
 }
 
-/// What a cell adds to the forces on its nodes, and to sums over all cells.
+/// Contribution of a cell to the forces on its nodes and to the sums over all cells.
 #[derive(Clone, Copy)]
 pub(super) struct Share<const D: usize> {
+    /// Forces on the nodes of the cell.
     pub(super) force: Nodal<D>,
+    /// Divergence against the pressures `1, xi, eta`.
     pub(super) divergence: [f64; 3],
+    /// Terms of the sums over cells.
     pub(super) sums: [f64; SUMS],
 }
 
-/// Sums over cells in a [`Residual`].
+/// Number of sums over cells in a [`Residual`].
 pub(super) const SUMS: usize = 7;
 
 impl<const D: usize> Default for Share<D> {
@@ -78,22 +97,26 @@ impl<const D: usize> Default for Share<D> {
     }
 }
 
-/// Residuals of a state, and powers that come with them.
+/// Residuals of a flow, with powers and norms that are computed with them.
 #[derive(Default)]
 pub(super) struct Residual<const D: usize> {
-    /// `f - K u + B' p`, constrained rows included.
+    /// `f - K u + B' p`, including constrained rows.
     pub(super) force: Vec<[f64; D]>,
-    /// `B u + C p`
+    /// `B u + C p`.
     pub(super) divergence: Vec<[f64; 3]>,
+    /// Viscous dissipation.
     pub(super) dissipation: f64,
+    /// Power of the terms that only some scenes have.
     pub(super) restoring: f64,
+    /// `integral D:D`.
     pub(super) strain: f64,
+    /// Square of the L2 norm of the projected divergence.
     pub(super) divergence_norm: f64,
-    /// `||B' p||^2_{1/D}`, cell by cell.
+    /// `||B' p||^2_{1/D}`, summed cell by cell.
     pub(super) pressure_norm: f64,
-    /// `||W^-1 p||^2`, the divergence that would make such a pressure.
+    /// `||W^-1 p||^2`: the divergence for which the penalty would give this pressure.
     pub(super) penalty_norm: f64,
-    /// `integral p^2`
+    /// `integral p^2`.
     pub(super) pressure_square: f64,
     /// Largest mean viscosity of a cell.
     pub(super) stiffest: f64,
@@ -102,19 +125,23 @@ pub(super) struct Residual<const D: usize> {
 /// A change of velocity (and rotation) and pressure.
 #[derive(Clone, Default)]
 pub(super) struct Correction<const D: usize> {
+    /// Change `du` of velocity (and rotation), by node.
     pub(super) velocity: Vec<[f64; D]>,
+    /// Change `dp` of the pressure, by cell.
     pub(super) pressure: Vec<[f64; 3]>,
-    /// `B du + C dp`
+    /// `B du + C dp`.
     pub(super) divergence: Vec<[f64; 3]>,
 }
 
 impl<const D: usize> Correction<D> {
+    /// Adds `factor` times another correction.
     pub(super) fn add_scaled(&mut self, factor: f64, o: &Correction<D>) {
         add_scaled(&mut self.velocity, factor, &o.velocity);
         add_scaled(&mut self.pressure, factor, &o.pressure);
         add_scaled(&mut self.divergence, factor, &o.divergence);
     }
 
+    /// Multiplies the correction by `factor`.
     pub(super) fn scale(&mut self, factor: f64) {
         fn scale<const N: usize>(a: &mut [[f64; N]], factor: f64) {
             threads::for_each(a, NODE_GRAIN, |_, a| a.iter_mut().for_each(|v| *v *= factor));
@@ -125,7 +152,7 @@ impl<const D: usize> Correction<D> {
     }
 }
 
-/// `a += factor b`
+/// `a += factor b`.
 pub(super) fn add_scaled<const N: usize>(a: &mut [[f64; N]], factor: f64, b: &[[f64; N]]) {
     threads::for_each(a, NODE_GRAIN, |k, a| {
         for c in 0..N {

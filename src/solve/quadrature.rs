@@ -1,19 +1,19 @@
-//! Integration points of all cells, and means that the solver needs.
+//! This module holds the integration points of all cells and the means that the solver needs.
 //!
-//! **Mixture**. Gauss points of every cell see the materials of the cell's own
-//! particles; [`composition`](crate::composition) says with which shares. Each material has its own
-//! law there, and the laws mix as [`Mixture`](crate::laws::mixture::Mixture) says. A cell of one
-//! uniform material sees that law exactly, whatever its particles' positions, so its element matrix
-//! is a constant.
+//! **Mixture**. The Gauss points of a cell see the materials of the cell's own particles, with the
+//! shares that [`composition`](crate::composition) computes. Each material has its own law there,
+//! and [`Mixture`](crate::laws::mixture::Mixture) computes the mean law. A cell of one uniform
+//! material has exactly that law for any positions of its particles, so its element matrix is a
+//! constant.
 //!
-//! **Laminate** (default). The same, but in cells that hold two materials the viscous stiffness is
-//! that of [`laminate`](super::laminate), with the interface that the composition finds.
-//! Where it finds none to trust (three materials, debris) the mixture stays. A stiff sheet below a
-//! cell is a laminate with straight rims, and a drop makes its cells a dilute suspension. Rotation,
-//! density and pictures are those of the mixture.
+//! **Laminate** (default). As the mixture, but the viscous stiffness of cells with two materials is
+//! that of [`laminate`](super::laminate), with the interface found by the composition. Where no
+//! interface can be trusted (three materials, debris) the mixture is used. A stiff sheet thinner
+//! than a cell is a laminate with straight edges; the cells of a drop are a dilute suspension.
+//! Rotation, density and images are those of the mixture.
 //!
-//! **Particles**. Each particle is an integration point with its own law and a weight
-//! proportional to its volume: the method of the source, for comparison.
+//! **Particles**. Each particle is an integration point with its own law and a weight proportional
+//! to its volume: the method of the source paper, for comparison.
 
 use super::evaluate::{CellsMut, Evaluation, LastFlow};
 use super::points::{CutStiffness, IntegrationPoint};
@@ -26,7 +26,7 @@ use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_3X3, Shape};
 use crate::threads;
 
-/// Cells that are worth a task of their own.
+/// Largest number of cells per task.
 const GRAIN: usize = 32;
 
 /// Integration points of all cells, and means that the solver needs.
@@ -34,18 +34,20 @@ pub struct Quadrature {
     rule: Rule,
     composition: Composition,
     kinds: Vec<Kind>,
+    /// Integration points, ordered by cell.
     pub(super) points: Vec<IntegrationPoint>,
+    /// Index of the first point of each cell, and the number of points.
     pub(super) start: Vec<u32>,
-    /// Stiffness of cut cells, by the laminate rule.
+    /// Stiffness of cut cells under the laminate rule.
     cut: Vec<Option<Box<CutStiffness>>>,
-    /// Mean viscosity of each cell's points; scales the penalty.
+    /// Mean viscosity of the points of each cell; it scales the penalty.
     pub mean_viscosity: Vec<f64>,
-    /// Mean 1/B of each cell.
+    /// Mean inverse bulk viscosity 1/B of each cell.
     pub compliance: Vec<f64>,
 }
 
 impl Quadrature {
-    /// Nothing is evaluated yet.
+    /// Creates the integration points of a mesh; no law is evaluated yet.
     pub fn new(mesh: &Mesh, rule: Rule, materials: usize) -> Self {
         let cells = mesh.cells();
         let (points, start) = match rule {
@@ -71,8 +73,8 @@ impl Quadrature {
         }
     }
 
-    /// Gauss points with the law, density and viscosity that `at(cell, position)` gives: the
-    /// integration that particles aim at, without any.
+    /// Creates Gauss points with the law, density and viscosity that `at(cell, position)` returns.
+    /// This is the exact integration that the particles approximate.
     pub fn from_fields(
         mesh: &Mesh,
         materials: usize,
@@ -94,22 +96,22 @@ impl Quadrature {
         out
     }
 
-    /// What is where.
+    /// Materials of all cells.
     pub fn composition(&self) -> &Composition {
         &self.composition
     }
 
-    /// What is where, to be set back to an earlier state.
+    /// Materials of all cells, to be restored to an earlier state.
     pub fn composition_mut(&mut self) -> &mut Composition {
         &mut self.composition
     }
 
-    /// What a cell is made of.
+    /// Content of a cell.
     pub fn content(&self, cell: usize) -> Content {
         self.composition.content(cell)
     }
 
-    /// The cell's nine points if they are those of the Gauss rule, row by row from below.
+    /// The nine points of a cell, row by row from below, if they are those of the Gauss rule.
     pub fn gauss_points(&self, cell: usize) -> Option<&[IntegrationPoint; 9]> {
         match self.rule {
             Rule::Mixture | Rule::Laminate => self.points[9 * cell..9 * cell + 9].try_into().ok(),
@@ -117,13 +119,13 @@ impl Quadrature {
         }
     }
 
-    /// Viscous stiffness that a cell has besides that of its integration points, which then have
-    /// only a part of theirs.
+    /// Viscous stiffness of a cut cell. Its integration points then have only a part of their
+    /// viscosity.
     pub fn cut(&self, cell: usize) -> Option<&CutStiffness> {
         self.cut[cell].as_deref()
     }
 
-    /// Integration points of a cell with their shape functions.
+    /// Calls `f` with each integration point of a cell and its shape functions.
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(&IntegrationPoint, &Shape)) {
         let range = self.start[cell] as usize..self.start[cell + 1] as usize;
         match self.rule {
@@ -140,11 +142,12 @@ impl Quadrature {
         }
     }
 
-    /// Evaluates all cells whose content is not known to be unchanged. `particles` sorted; `flow`:
-    /// the last iterate, for laws that depend on it.
+    /// Evaluates all cells whose content may have changed. `particles` must be sorted. `version`
+    /// counts changes of the material table. `flow` is the last iterate, for laws that depend on
+    /// it.
     ///
     /// # Errors
-    /// A cell that nothing fills.
+    /// Returns [`EmptyCell`] if a cell has neither particles nor a background material.
     pub fn update(
         &mut self,
         mesh: &Mesh,
@@ -160,7 +163,8 @@ impl Quadrature {
             directors: m.law.is_layered(),
             viscosity: m.carries_viscosity,
         }));
-        // Particles as integration points move: their matrix is never the one before.
+        // Particles as integration points move, so the matrix of a cell with particles always
+        // changes.
         let moving = self.rule == Rule::Particles;
         let Quadrature { composition, kinds, .. } = self;
         composition.update(mesh, particles, kinds, (background, version), moving)?;
@@ -174,7 +178,7 @@ impl Quadrature {
         let Quadrature {
             rule, composition, kinds, points, cut, mean_viscosity, compliance, ..
         } = self;
-        // The shares are written while the rest of the composition is read.
+        // The volume fractions are written while the rest of the composition is read.
         let mut fractions = std::mem::take(&mut composition.fractions);
         let from = Evaluation {
             rule: *rule,
@@ -208,7 +212,7 @@ impl Quadrature {
         Ok(())
     }
 
-    /// Particles as integration points.
+    /// Fills the points of a cell whose particles are the integration points.
     fn list(
         &mut self,
         mesh: &Mesh,
@@ -258,8 +262,8 @@ impl Quadrature {
         self.start[cell + 1] = self.points.len() as u32;
     }
 
-    /// Few particles of a Cosserat material leave its rotation undetermined in a cut cell: a
-    /// billionth of its law at the Gauss points holds it.
+    /// Adds a billionth of the law of each Cosserat material at the Gauss points of a mixed cell: a
+    /// few particles of such a material leave the rotation undetermined.
     fn hold_rotation(&mut self, cell: usize, materials: &[Material]) {
         const HOLD: f64 = 1e-9;
         if self.composition.content(cell) != Content::Mixed {

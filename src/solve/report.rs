@@ -1,42 +1,48 @@
-//! How a solution went, when it stops, and why there may be none.
+//! This module defines the report of a solution, the stopping criteria and the errors.
 
 use super::multifrontal::NotPositiveDefinite;
 
-/// Powers below this share of [`Report::power_scale`] are rounding: the scene is at rest.
+/// Powers below this fraction of [`Report::power_scale`] are rounding errors of a scene at rest.
 const REST: f64 = 1e-6;
-/// When the corrections stop.
+
+/// Stopping criteria of the corrections.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopping {
-    /// On the scaled residual and on the relative divergence.
+    /// Tolerance on the scaled residual and on the relative divergence.
     pub tolerance: f64,
+    /// Largest number of corrections.
     pub max_corrections: u32,
 }
 
-/// How a solution went.
+/// Report of a solution; powers are in the plan's units.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Report {
+    /// Number of corrections.
     pub corrections: u32,
-    /// `||r||_{1/D} / (||f||_{1/D} + ||sqrt(D) u||)`, `D = diag K`.
+    /// Scaled residual `||r||_{1/D} / (||f||_{1/D} + ||sqrt(D) u||)`, `D = diag K`, with a small
+    /// share of the forces of the pressure added to the denominator.
     pub residual: f64,
-    /// L2 norm of the projected divergence over that of the strain rate.
+    /// L2 norm of the projected divergence over that of the strain rate, with small terms added to
+    /// the denominator for rest and rigid rotation.
     pub divergence: f64,
     /// Power of loads and of moving boundaries.
     pub power_in: f64,
     /// Viscous dissipation.
     pub dissipation: f64,
-    /// Power that the restoring terms of [`super::buoyancy`] take from the flow; numerical.
+    /// Numerical power that the terms of [`restoring`](super::terms::restoring) take from the flow.
     pub restoring: f64,
-    /// A scale for powers that rounding alone makes: `||f||^2_{1/D}`, the power the loads would
-    /// have on a mesh of one element, `integral p^2/eta`, what the pressure would have if it strained
-    /// the stiffest fluid, and a little of `||sqrt(D) u||^2`.
+    /// Scale of the rounding errors of powers: the sum of `||f||^2_{1/D}`, the power of the loads
+    /// on a mesh of one element; of `integral p^2/eta`, the power of the pressure if it strained
+    /// the stiffest fluid; and of a small share of `||sqrt(D) u||^2`.
     pub power_scale: f64,
-    /// Rotation unknowns that some Cosserat material acts on.
+    /// Number of rotation unknowns that some Cosserat material acts on.
     pub active_rotation: usize,
+    /// Wall time of the parts of the solution.
     pub seconds: Seconds,
 }
 
 impl Report {
-    /// What is left of the powers, over the largest of them.
+    /// Imbalance of the powers relative to the largest of them.
     pub fn power_error(&self) -> f64 {
         let larger = [self.power_in, self.dissipation, self.restoring, REST * self.power_scale];
         let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));
@@ -45,30 +51,59 @@ impl Report {
     }
 }
 
-/// Wall seconds of the parts of a solution.
+/// Wall time of the parts of a solution, s.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seconds {
+    /// Time for the element matrices, s.
     pub assemble: f64,
+    /// Time for the factorisation, s.
     pub factor: f64,
+    /// Time for the corrections, s.
     pub solve: f64,
 }
 
-/// Why there is no solution.
+/// Reasons why there is no solution.
 #[derive(Debug, thiserror::Error)]
 pub enum SolveError {
+    /// The matrix is not positive definite.
     #[error("{source}, at ({x:.4e}, {y:.4e}), unknown {component}")]
-    Factor { source: NotPositiveDefinite, x: f64, y: f64, component: &'static str },
+    Factor {
+        /// Error of the factorisation.
+        source: NotPositiveDefinite,
+        /// Coordinate x of the node.
+        x: f64,
+        /// Coordinate y of the node.
+        y: f64,
+        /// Name of the unknown: `u`, `v` or `w`.
+        component: &'static str,
+    },
+    /// The corrections did not converge.
     #[error(
         "no convergence in {corrections} corrections: residual {residual:.1e}, \
-         divergence {divergence:.1e}; the worst is at ({x:.4e}, {y:.4e})"
+         divergence {divergence:.1e}; the largest error is at ({x:.4e}, {y:.4e})"
     )]
-    Stalled { corrections: u32, residual: f64, divergence: f64, x: f64, y: f64 },
+    Stalled {
+        /// Number of corrections.
+        corrections: u32,
+        /// Scaled residual; see [`Report::residual`].
+        residual: f64,
+        /// Relative divergence; see [`Report::divergence`].
+        divergence: f64,
+        /// Coordinate x of the largest error.
+        x: f64,
+        /// Coordinate y of the largest error.
+        y: f64,
+    },
+    /// The residual is infinite or not a number.
     #[error("the solution is not finite after {corrections} corrections")]
-    NonFinite { corrections: u32 },
+    NonFinite {
+        /// Number of corrections.
+        corrections: u32,
+    },
 }
 
 impl SolveError {
-    /// The same with coordinates in units of `length`.
+    /// The error with its coordinates multiplied by `length`.
     pub fn scaled(mut self, length: f64) -> Self {
         match &mut self {
             SolveError::Factor { x, y, .. } | SolveError::Stalled { x, y, .. } => {

@@ -1,5 +1,5 @@
-//! The residual of a state: what the forces and the divergence leave over, cell by cell, and the norms
-//! and powers that come with them.
+//! This module computes the residual of a flow, the imbalance of forces and the divergence, cell by
+//! cell, with the norms and powers that are computed from it.
 
 use super::problem::{CELL_GRAIN, Loads, Residual, Share, Stokes, Work};
 use super::quadrature::Quadrature;
@@ -11,19 +11,21 @@ use crate::space::shape::{NODES, SIDE_NODES};
 use crate::threads;
 use std::ops::Range;
 
-/// Share of `||sqrt(D) u||` in the scale of the divergence: far below that of a strained flow.
+/// Share of `||sqrt(D) u||` in the scale of the divergence; negligible in a strained flow.
 const RIGID_SHARE: f64 = 1e-3;
 
-/// Share of the pressure's forces in the scale of the residual, and of what the penalty makes of
-/// the pressure in that of the divergence: at the usual tolerance a unit or two in the last place of
-/// a pressure that is far larger than the stresses of the flow.
+/// Share of the forces of the pressure in the scale of the residual, and of the divergence that
+/// belongs to the pressure by the penalty in the tolerance of the divergence. At the usual
+/// tolerance it allows one or two units in the last place of a pressure far larger than the viscous
+/// stresses.
 pub(super) const PRESSURE_SHARE: f64 = 3e-4;
 
-/// Share of `||sqrt(D) u||^2` in that scale: far below the dissipation of a strained flow, above
-/// the rounding of a rigid one.
+/// Share of `||sqrt(D) u||^2` in the scale of powers: far below the dissipation of a strained flow,
+/// above the rounding errors of a rigid one.
 const RIGID_POWER: f64 = 3e-2;
 
 impl<const D: usize> Stokes<D> {
+    /// Computes the residual of `flow`.
     pub(super) fn residual(
         &self,
         quadrature: &Quadrature,
@@ -33,7 +35,7 @@ impl<const D: usize> Stokes<D> {
     ) {
         let Work { residual: out, shares, .. } = work;
         let cells = self.mesh.cells();
-        // Whole blocks; what is beyond the last cell stays zero.
+        // Whole blocks of cells; entries after the last cell stay zero.
         shares.resize(cells.next_multiple_of(TOGETHER), Share::default());
         let (blocks, _) = shares.as_chunks_mut::<TOGETHER>();
         threads::for_each(blocks, CELL_GRAIN / TOGETHER, |block, shares| {
@@ -65,7 +67,7 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    /// Of some cells that are computed together.
+    /// Computes the residuals of up to [`TOGETHER`] cells.
     fn residuals(
         &self,
         cells: Range<usize>,
@@ -86,6 +88,7 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
+    /// Computes the residual of one cell from its internal forces.
     fn cell_residual(
         &self,
         cell: usize,
@@ -142,8 +145,8 @@ impl<const D: usize> Stokes<D> {
             [dissipation, strain, norms, taken, pressure_norm, penalty_norm, pressure_square];
     }
 
-    /// Scaled residual, relative divergence, what the penalty makes of the pressure relative to the
-    /// same scale, and a scale of power.
+    /// Returns the scaled residual, the relative divergence, the divergence that belongs to the
+    /// pressure by the penalty (relative to the same scale), and a scale of power.
     pub(super) fn norms(
         &self,
         r: &Residual<D>,
@@ -166,8 +169,8 @@ impl<const D: usize> Stokes<D> {
             }
             sums
         });
-        // The last two terms keep the ratio sensible when nothing moves, and in a rigid rotation,
-        // where divergence and strain are both rounding.
+        // The last terms keep the ratios meaningful at rest and in a rigid rotation, where
+        // divergence and strain are both rounding errors.
         let scale = ff.sqrt() + uu.sqrt() + PRESSURE_SHARE * r.pressure_norm.sqrt();
         let strain = r.strain.sqrt() + ff.sqrt() + RIGID_SHARE * uu.sqrt();
         let ratio = |a: f64, b: f64| if a == 0.0 { 0.0 } else { a / b };

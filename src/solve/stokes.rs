@@ -1,29 +1,30 @@
-//! One solution of the (Cosserat) Stokes problem for given integration points.
+//! This module computes one solution of the (Cosserat) Stokes problem for given integration points.
 //!
 //! ```text
 //! K u - B' p = f,    -B u - C p = 0        (C = Mp / bulk viscosity, 0 if incompressible)
 //! ```
-//! The discontinuous pressure is eliminated cell by cell by an augmented Lagrangian; the matrix
-//! `A = K + B' W B`, `W = (C + Mp / (r eta))^-1`, is factored, and the solution is found by
-//! corrections of the *un-augmented* residual:
+//! The discontinuous pressure is eliminated cell by cell with an augmented Lagrangian. The matrix
+//! `A = K + B' W B`, `W = (C + Mp / (r eta))^-1`, is factored, and corrections of the residual of
+//! the equations *without* augmentation give the solution:
 //!
 //! ```text
 //! ru = f - K u + B' p,   rp = B u + C p,   du = A^-1 (ru - B' W rp),   dp = -W (rp + B du)
 //! ```
-//! With `r = 1e4` and `eta` the mean viscosity of the cell's points this takes 3-4 corrections
-//! at contrasts up to 1e6; a constant `r`, or a geometric mean, fails there.
+//! With `r = 1e6` and `eta` the mean viscosity of the points of the cell, two or three corrections
+//! suffice at the contrasts of the presets. A constant `r eta`, or a geometric mean for `eta`,
+//! fails at contrasts up to 1e6.
 //!
-//! Once the forces balance (`ru = 0`), every correction keeps them balanced, and so does any sum of
-//! corrections: each new one is combined with those before it such that the divergence that
-//! remains is least (generalised conjugate residuals; Eisenstat, Elman and Schultz 1983). The
-//! pressure of a weak pocket in stiff surroundings, which single corrections of weight `r eta` of
-//! the pocket approach by a share `r eta/eta_stiff` each, is so found at once; the residuals are
-//! always computed afresh from the fields.
+//! Once the forces balance (`ru = 0`), every correction keeps them balanced, and so does every
+//! linear combination of corrections. Each new correction is therefore combined with the previous
+//! ones so that the remaining divergence is smallest (generalised conjugate residuals; Eisenstat,
+//! Elman and Schultz 1983). This finds the pressure of a weak pocket in stiff surroundings at once;
+//! single corrections, with the weight `r eta` of the pocket, reduce its error only by the fraction
+//! `r eta/eta_stiff` each. The residuals are always computed afresh from the fields.
 //!
-//! A solution that has converged must also balance its power: where one coefficient exceeds what
-//! resists the flow by many orders (an internal length a million times the domain, layers a million
-//! times weaker along than across), a residual that is small beside the former leaves an error in
-//! the latter, and a few more corrections bring it down to rounding.
+//! A converged solution must also balance its power. Where one coefficient exceeds the resistance
+//! to the flow by many orders of magnitude (an internal length a million times the domain, layers a
+//! million times weaker along than across), a residual that is small relative to that coefficient
+//! leaves an error in the flow; a few more corrections reduce it to rounding.
 
 use super::matrices::{Ingredients, Matrices};
 use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
@@ -42,11 +43,13 @@ use crate::threads;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Powers must balance to this, or as near as that many further corrections bring them.
+/// Relative tolerance of the balance of powers of a converged solution.
 const POWER_TOLERANCE: f64 = 1e-9;
+/// Largest number of further corrections that reduce the error of the balance of powers.
 const POWER_CORRECTIONS: u32 = 3;
 
 impl<const D: usize> Stokes<D> {
+    /// Creates the problem on a mesh; nothing is assembled or factored yet.
     pub fn new(mesh: Arc<Mesh>, constraints: Constraints<D>) -> Self {
         let Symbolic { tree, incidence } = Symbolic::of(&mesh);
         Stokes {
@@ -62,27 +65,25 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    pub fn mesh(&self) -> &Arc<Mesh> {
-        &self.mesh
-    }
-    pub fn constraints(&self) -> &Constraints<D> {
-        &self.constraints
-    }
-    /// Velocity and rotation unknowns, condensed ones included.
+    /// Number of velocity and rotation unknowns, including condensed ones.
     pub fn unknowns(&self) -> usize {
         self.mesh.nodes() * D
     }
-    /// What the last factorisation took.
+    /// Work of the last factorisation.
     pub fn effort(&self) -> Effort {
         self.factor.effort()
     }
 
-    /// Lets the next factorisation compute all of the factor, changed or not: for measurements.
+    /// Makes the next factorisation compute the whole factor, for measurements of its time.
     pub fn forget_factor(&mut self) {
         self.factor.forget();
     }
 
-    /// Solves for `flow`, starting from what it holds.
+    /// Solves for `flow`, which holds the initial guess.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the matrix is not positive definite, the corrections do not converge, or
+    /// the solution is not finite.
     pub fn solve(
         &mut self,
         quadrature: &Quadrature,
@@ -110,7 +111,7 @@ impl<const D: usize> Stokes<D> {
         Ok(report)
     }
 
-    /// Corrects `flow` until the residual is small.
+    /// Corrects `flow` until the residual, the divergence and the balance of powers are small.
     fn iterate(
         &mut self,
         given: &Given<D>,
@@ -145,14 +146,16 @@ impl<const D: usize> Stokes<D> {
                 return Err(self.stalled(residual, report, stopping.tolerance));
             }
             self.correct(quadrature, work);
-            // Sums of corrections mind the divergence only; here the forces are to be corrected.
+            // Linear combinations reduce the divergence only; while the forces do not balance, the
+            // correction is applied as it is.
             self.combine(work, balanced && !converged);
             self.apply(work, flow);
             report.corrections += 1;
         }
     }
 
-    /// Element matrices of the cells that changed; number of active rotation unknowns.
+    /// Computes the element matrices of the cells that changed; returns the number of active
+    /// rotation unknowns.
     fn assemble(&mut self, quadrature: &Quadrature, terms: &Terms) -> usize {
         let Stokes {
             mesh,
@@ -174,6 +177,7 @@ impl<const D: usize> Stokes<D> {
         if D == 3 { diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
     }
 
+    /// The error of a failed factorisation, with the position and the name of the unknown.
     fn explain(&self, source: NotPositiveDefinite) -> SolveError {
         let node = self.factor.tree().node[source.unknown / D] as usize;
         let [x, y] = self.mesh.node_position(node);
@@ -181,6 +185,8 @@ impl<const D: usize> Stokes<D> {
         SolveError::Factor { source, x, y, component }
     }
 
+    /// The error of a solution that did not converge, with the position of the largest residual, or
+    /// of the largest divergence if the residual has converged.
     fn stalled(&self, r: &Residual<D>, report: &Report, tolerance: f64) -> SolveError {
         let largest = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
         let [x, y] = if report.residual > tolerance {

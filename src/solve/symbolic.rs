@@ -1,32 +1,35 @@
-//! What a mesh alone decides, kept for the next run on it: the explorer starts runs again and again on
-//! the same mesh, and a sweep of cases shares one too.
+//! This module keeps the data that depend on the mesh alone, for the next run on the same mesh. The
+//! explorer starts many runs on the same mesh, and the cases of a sweep share one too.
 
 use super::multifrontal::tree::Tree;
 use crate::space::incidence::Incidence;
 use crate::space::mesh::Mesh;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Meshes that are remembered.
+/// Largest number of meshes whose data are kept.
 const KEPT: usize = 4;
-/// Larger ones are not: what they decide takes hundreds of bytes a cell.
+/// Largest mesh, in cells, whose data are kept: they take hundreds of bytes per cell.
 const MOST_CELLS: usize = 1 << 16;
 
-/// Which nodes cells have, and in which order unknowns are eliminated.
+/// Nodes of the cells, and the order in which unknowns are eliminated.
 #[derive(Clone)]
 pub struct Symbolic {
+    /// Elimination tree of the multifrontal factorisation.
     pub tree: Arc<Tree>,
+    /// Incidence of cells and nodes.
     pub incidence: Arc<Incidence>,
 }
 
-/// The latest first.
+/// Meshes with their data, the most recently used first.
 static KNOWN: Mutex<Vec<(Arc<Mesh>, Symbolic)>> = Mutex::new(Vec::new());
 
 impl Symbolic {
+    /// Computes the data of a mesh.
     pub fn new(mesh: &Mesh) -> Self {
         Symbolic { tree: Arc::new(Tree::new(mesh)), incidence: Arc::new(Incidence::new(mesh)) }
     }
 
-    /// That of an equal mesh, if one is remembered.
+    /// Returns the data kept for an equal mesh, or computes them.
     pub fn of(mesh: &Arc<Mesh>) -> Self {
         let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         let remember = |mesh: Arc<Mesh>, symbolic: Symbolic| {

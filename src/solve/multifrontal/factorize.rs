@@ -1,4 +1,5 @@
-//! Numerical factorisation: eliminates fronts from the leaves to the root.
+//! This module computes the numerical factorisation: it eliminates the fronts from the leaves to
+//! the root.
 
 use super::super::element::{CellBlocks, pair};
 use super::*;
@@ -7,16 +8,20 @@ use crate::threads;
 use front::{Child, Matrix};
 use tree::{Run, Source, Tree};
 
-/// One factorisation.
+/// Inputs of one factorisation.
 pub(super) struct Factorize<'a, const D: usize> {
+    /// The elimination tree.
     pub(super) tree: &'a Tree,
+    /// Whether each front must be factored again.
     pub(super) stale: &'a [bool],
+    /// Instruction set of the kernels.
     pub(super) simd: Simd,
+    /// Element matrices.
     pub(super) cells: &'a [CellBlocks<D>],
 }
 
 impl<const D: usize> Factorize<'_, D> {
-    /// A subtree whose update is kept; `part` holds just this subtree.
+    /// Factors a subtree whose update is kept; `part` holds the data of this subtree only.
     pub(super) fn kept(
         &self,
         f: usize,
@@ -55,7 +60,7 @@ impl<const D: usize> Factorize<'_, D> {
         self.eliminate(f, matrix)
     }
 
-    /// A subtree that is redone whole, with all updates below it in `work`.
+    /// Factors a subtree that is recomputed whole; all updates below it are in `work`.
     pub(super) fn whole(
         &self,
         f: usize,
@@ -90,7 +95,7 @@ impl<const D: usize> Factorize<'_, D> {
         self.eliminate(f, matrix)
     }
 
-    /// A front from its children's updates.
+    /// Assembles a front from the updates of its children.
     pub(super) fn assemble(
         &self,
         matrix: &mut Matrix,
@@ -106,6 +111,7 @@ impl<const D: usize> Factorize<'_, D> {
         matrix.assemble::<D>([child(0), child(1)]);
     }
 
+    /// Eliminates the own unknowns of a front.
     pub(super) fn eliminate(
         &self,
         f: usize,
@@ -116,6 +122,7 @@ impl<const D: usize> Factorize<'_, D> {
     }
 }
 
+/// Adds the element matrix of a cell whose nodes are at the indices `nodes` of the front.
 pub(super) fn add_cell<const D: usize>(
     matrix: &mut Matrix,
     nodes: &[u16; 8],
@@ -127,7 +134,7 @@ pub(super) fn add_cell<const D: usize>(
             let at = [nodes[k], nodes[l]].map(usize::from);
             matrix.add_block([at[0].max(at[1]), at[0].min(at[1])], block, at[0] < at[1]);
             if k != l && at[0] == at[1] {
-                // A periodic cell that is its own neighbour: both blocks are on the diagonal.
+                // In a periodic cell that is its own neighbour, both blocks are on the diagonal.
                 matrix.add_block(at, block, true);
             }
         }

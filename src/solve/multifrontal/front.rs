@@ -1,34 +1,38 @@
-//! One front: its dense matrix, its elimination, its part of the substitutions.
+//! This module defines the dense matrix of one front and its elimination.
 //!
 //! ```text
 //! [ F11  .   ]     F11 = L11 L11',   L21 = F21 L11^-T,   U = F22 - L21 L21'
 //! [ F21  F22 ]
 //! ```
-//! `F11` and `F21` are the *panel*, in whose place the columns of the factor come; `F22`, of which
-//! only the lower triangle matters, is the *update* that the parent is assembled from. The update is
-//! stored in blocks of [`BLOCK`] columns, each from its first diagonal entry down.
+//! `F11` and `F21` are the *panel*, which the columns of the factor replace. `F22`, of which only
+//! the lower triangle is used, becomes the *update* that the parent is assembled from. The update
+//! is stored in blocks of [`BLOCK`] columns, each from its first diagonal entry down.
 
 use super::kernels::{self, Columns, ColumnsMut, PANEL, Product};
 use super::tree::Run;
 use crate::simd::Simd;
 
-/// Columns of a block of an update.
+/// Number of columns of a block of an update.
 const BLOCK: usize = 64;
 
-/// Columns of the panel that are brought up to date together.
+/// Number of columns of the panel that are updated together.
 const WIDE: usize = 8 * PANEL;
 
-/// Unknowns of a front.
+/// Number of unknowns of a front.
 #[derive(Clone, Copy, Debug)]
 pub struct Size {
+    /// Number of unknowns that the front eliminates.
     pub own: usize,
+    /// Number of unknowns on its rim.
     pub rim: usize,
 }
 
 impl Size {
+    /// Number of rows of the panel: all unknowns of the front.
     pub fn rows(self) -> usize {
         self.own + self.rim
     }
+    /// Entries of the panel.
     pub fn panel(self) -> usize {
         self.own * self.rows()
     }
@@ -49,40 +53,47 @@ fn update_len(rim: usize) -> usize {
     block_start(rim, full) + rest * rest
 }
 
-/// Where block `k` of columns starts, and the rows it has.
+/// Index of the first entry of block `k` of columns.
 fn block_start(rim: usize, k: usize) -> usize {
     BLOCK * k * rim - BLOCK * BLOCK * (k * k - k) / 2
 }
 
-/// Where column `j` of an update has its entry in row `j`.
+/// Index of the diagonal entry of column `j` of an update.
 fn column_start(rim: usize, j: usize) -> usize {
     let k = j / BLOCK;
     let within = j - k * BLOCK;
     block_start(rim, k) + within * (rim - k * BLOCK) + within
 }
 
-/// What a child adds to its parent: its update, of `rim` unknowns, in runs of unknowns that are
-/// neighbours in both. Both ascend from run to run.
+/// Update of a child, with the runs of unknowns that are consecutive in both child and parent. Both
+/// indices ascend from run to run.
 pub struct Child<'a> {
+    /// Number of unknowns of the update.
     pub rim: usize,
+    /// Entries of the update.
     pub update: &'a [f64],
+    /// Runs of nodes, in ascending order.
     pub runs: &'a [Run],
 }
 
 /// The matrix of a front.
 pub struct Matrix<'a> {
+    /// Number of unknowns.
     pub size: Size,
+    /// Entries of the panel, column by column.
     pub panel: &'a mut [f64],
+    /// Entries of the update, block by block.
     pub update: &'a mut [f64],
 }
 
 impl Matrix<'_> {
+    /// Sets all entries to zero.
     pub fn clear(&mut self) {
         self.panel.fill(0.0);
         self.update.fill(0.0);
     }
 
-    /// All that is stored of a column, also above the diagonal.
+    /// All stored entries of a column, including those above the diagonal.
     fn whole_column(&mut self, j: usize) -> &mut [f64] {
         let Size { own, rim } = self.size;
         if j < own {
@@ -96,7 +107,7 @@ impl Matrix<'_> {
         }
     }
 
-    /// Entries of a column from row `i` on, `i` not above the diagonal.
+    /// Entries of a column from row `i` on; row `i` must not be above the diagonal.
     fn column_from(&mut self, j: usize, i: usize) -> &mut [f64] {
         let Size { own, rim } = self.size;
         if j < own {
@@ -109,8 +120,8 @@ impl Matrix<'_> {
         }
     }
 
-    /// Adds a block of `D` unknowns of each of two nodes; `transposed` if the entry of row node's
-    /// unknown `r` and column node's unknown `c` is `block[c][r]`.
+    /// Adds the block of a pair of nodes with `D` unknowns each. If `transposed`, the entry of
+    /// unknown `r` of the row node and unknown `c` of the column node is `block[c][r]`.
     pub fn add_block<const D: usize>(
         &mut self,
         [row, column]: [usize; 2],
@@ -126,7 +137,8 @@ impl Matrix<'_> {
         }
     }
 
-    /// Sums up the children's updates, column by column: large fronts go through the cache once.
+    /// Sets the matrix to the sum of the updates of the children. It proceeds column by column, so
+    /// large fronts pass through the cache once.
     pub fn assemble<const D: usize>(&mut self, mut children: [Child; 2]) {
         for to in 0..self.size.rows() {
             self.whole_column(to).fill(0.0);
@@ -139,7 +151,7 @@ impl Matrix<'_> {
                 let k = to - first;
                 let j = D * run.child as usize + k;
                 let column = &child.update[column_start(child.rim, j)..];
-                // The rest of this run, then those after it.
+                // The rest of this run, then the later runs.
                 let rest = D * run.len as usize - k;
                 add(&mut self.column_from(to, to)[..rest], &column[..rest]);
                 for other in later {
@@ -155,7 +167,10 @@ impl Matrix<'_> {
         }
     }
 
-    /// Eliminates the own unknowns; the index of one whose pivot is not positive.
+    /// Eliminates the own unknowns.
+    ///
+    /// # Errors
+    /// Returns the index of an unknown whose pivot is not positive and finite.
     pub fn eliminate(&mut self, simd: Simd) -> Result<(), usize> {
         let Size { own, rim } = self.size;
         let ld = own + rim;
@@ -178,7 +193,8 @@ impl Matrix<'_> {
         Ok(())
     }
 
-    /// Columns `k..k + width` of the panel, after those before them.
+    /// Eliminates columns `k..k + width` of the panel; the columns before them are already
+    /// eliminated.
     fn eliminate_columns(&mut self, simd: Simd, k: usize, width: usize) -> Result<(), usize> {
         let ld = self.size.rows();
         let rows = ld - k;

@@ -1,5 +1,6 @@
-//! Dense kernels on columns, for the widest vectors that the processor has (see [`simd`](crate::simd)).
-//! Matrices are stored column by column: entry `(i, j)` is at `i + j ld`.
+//! This module contains dense kernels on columns, compiled for the widest vectors of the processor
+//! (see [`simd`](crate::simd)). Matrices are stored column by column: entry `(i, j)` is at
+//! `i + j ld`.
 
 mod substitution;
 
@@ -8,31 +9,39 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use substitution::{backward_kernel, forward_kernel};
 
-/// Columns of a panel that are eliminated together.
+/// Number of columns of a panel that are eliminated together.
 pub const PANEL: usize = 8;
 
-/// From this many multiplications per column and this depth on faer's packed product is faster.
+/// Smallest depth at which the packed product of faer is faster.
 const PACKED_DEPTH: usize = 48;
+/// Smallest number of rows at which the packed product of faer is faster.
 const PACKED_ROWS: usize = 96;
 
-/// Columns of a matrix, to be read.
+/// Read-only columns of a matrix.
 #[derive(Clone, Copy)]
 pub struct Columns<'a> {
+    /// Entries, column by column.
     pub data: &'a [f64],
+    /// Distance between the starts of two columns, in entries.
     pub ld: usize,
 }
 
-/// Columns of a matrix, to be written.
+/// Mutable columns of a matrix.
 pub struct ColumnsMut<'a> {
+    /// Entries, column by column.
     pub data: &'a mut [f64],
+    /// Distance between the starts of two columns, in entries.
     pub ld: usize,
 }
 
 /// Size of a product `A B'`: `A` has `rows` rows, `B` has `columns`, both have `depth` columns.
 #[derive(Clone, Copy)]
 pub struct Product {
+    /// Rows of `A`.
     pub rows: usize,
+    /// Rows of `B`, the columns of the product.
     pub columns: usize,
+    /// Columns of `A` and `B`.
     pub depth: usize,
 }
 
@@ -41,14 +50,14 @@ dispatch! {
     fn subtract_small(c: ColumnsMut, a: Columns, size: Product) = subtract_square_kernel
 }
 dispatch! {
-    /// Eliminates the first columns, at most [`PANEL`], of a matrix of `rows` rows: afterwards they
-    /// are columns of its Cholesky factor, with the inverse of each pivot in its place.
+    /// Eliminates the first `columns` columns, at most [`PANEL`], of a matrix of `rows` rows.
+    /// Afterwards they are columns of its Cholesky factor, with the inverse of each pivot in its
+    /// place. The error is the index of a pivot that is not positive and finite.
     pub fn factor_panel(c: ColumnsMut, rows: usize, columns: usize) -> Result<(), usize>
         = factor_panel_kernel
 }
 dispatch! {
-    /// Forward substitution with columns of a factor: `x` becomes `L1^-1 x`, and what is left is
-    /// taken from `rest`: `rest -= L2 x`.
+    /// Forward substitution with columns of a factor: `x` becomes `L1^-1 x`; then `rest -= L2 x`.
     pub fn forward(l: Columns, x: &mut [f64], rest: &mut [f64]) = forward_kernel
 }
 dispatch! {
@@ -56,8 +65,8 @@ dispatch! {
     pub fn backward(l: Columns, x: &mut [f64], rest: &[f64]) = backward_kernel
 }
 
-/// `C -= A B'` on and below the diagonal, where `B` is the first rows of `A`: below the first
-/// square large ones by faer's packed product.
+/// `C -= A B'` on and below the diagonal, where `B` is the first rows of `A`. Below the first
+/// square, large products use the packed product of faer.
 pub fn subtract_square(simd: Simd, c: ColumnsMut, a: Columns, size: Product) {
     let Product { rows, columns, depth } = size;
     if depth < PACKED_DEPTH || rows < PACKED_ROWS {
@@ -83,7 +92,7 @@ pub fn subtract_square(simd: Simd, c: ColumnsMut, a: Columns, size: Product) {
     }
 }
 
-/// `c - a b`
+/// `c - a b`.
 #[inline(always)]
 fn negated_product<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
     multiply_add::<FMA>(-a, b, c)
@@ -128,7 +137,7 @@ fn subtract_square_kernel<const R: usize, const FMA: bool>(
     }
 }
 
-/// Rows `from..to` of `C` columns.
+/// Rows `from..to` of `C` columns of the product.
 #[inline(always)]
 fn strip<const R: usize, const C: usize, const FMA: bool>(
     mut c: ColumnsMut,
@@ -189,7 +198,7 @@ fn factor_panel_kernel<const R: usize, const FMA: bool>(
     columns: usize,
 ) -> Result<(), usize> {
     let ColumnsMut { data, ld } = c;
-    // The block on the diagonal, entry (i, j) at [j][i].
+    // The diagonal block; entry `(i, j)` is at `[j][i]`.
     let mut l = [[0.0; PANEL]; PANEL];
     let mut inverse = [0.0; PANEL];
     for j in 0..columns {
@@ -200,7 +209,7 @@ fn factor_panel_kernel<const R: usize, const FMA: bool>(
             }
             l[j][i] = s;
         }
-        // Nothing acts on this unknown: it stays what it is.
+        // No matrix entry acts on this unknown: its value is unchanged.
         if l[j][j] == 0.0 {
             l[j][j] = 1.0;
         }
@@ -243,7 +252,7 @@ fn factor_panel_kernel<const R: usize, const FMA: bool>(
     Ok(())
 }
 
-/// Rows below a full diagonal block: `X L' = A`.
+/// Computes rows below a full diagonal block: `X L' = A`.
 #[inline(always)]
 fn below<const R: usize, const FMA: bool>(
     data: &mut [f64],
@@ -277,7 +286,7 @@ mod tests {
         (0..n).map(|k| ((k * k) as f64 * 0.37 + 1.0).sin()).collect()
     }
 
-    /// Every instruction set does what plain loops do.
+    /// The kernels of every instruction set agree with plain loops.
     #[test]
     fn products_are_those_of_plain_loops() {
         for simd in simd::all() {
@@ -301,7 +310,7 @@ mod tests {
         }
     }
 
-    /// `L1 L1'` and `L2 L1'` give the matrix back, and both substitutions invert it.
+    /// `L1 L1'` and `L2 L1'` reproduce the matrix, and both substitutions invert it.
     #[test]
     fn panels_and_substitutions_invert() {
         for simd in simd::all() {
@@ -341,7 +350,8 @@ mod tests {
                         assert!((product - a[i + j * rows]).abs() < 1e-12 * rows as f64);
                     }
                 }
-                // L [x; rest'] = [b; rest]: forward gives x, and rest loses L2 x.
+                // L [x; rest'] = [b; rest]: the forward substitution gives x and subtracts L2 x
+                // from rest.
                 let (b, rest) = (numbers(own), numbers(rim));
                 let (mut x, mut left) = (b.clone(), rest.clone());
                 let columns = Columns { data: &l, ld: rows };

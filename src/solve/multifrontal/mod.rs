@@ -1,18 +1,20 @@
-//! Multifrontal Cholesky factorisation of the skeleton matrix of a structured mesh.
+//! This module computes a multifrontal Cholesky factorisation of the skeleton matrix of a
+//! structured mesh.
 //!
-//! The matrix is never assembled. Every cell hands in its element matrix; the fronts of the
-//! dissection (`tree.rs`) add up the matrices of their cells or their children's updates, eliminate
-//! their own unknowns (`front.rs`) and hand an update on. With 2 or 3 unknowns a node a mesh of `N`
-//! cells has `O(N log N)` entries in the factor and takes `O(N^1.5)` operations.
+//! The global matrix is never assembled. Each front of the nested dissection (`tree.rs`) is the sum
+//! of the element matrices of its cells or of the updates of its children. It eliminates its own
+//! unknowns (`front.rs`) and passes an update to its parent. With 2 or 3 unknowns per node, a mesh
+//! of `N` cells has `O(N log N)` entries in the factor and takes `O(N^1.5)` operations.
 //!
-//! **Only what changed is factored again.** A front whose cells all handed in the same matrix, bit
-//! for bit, as before keeps its part of the factor and its update; those above cells that changed
-//! are redone, with the same operations in the same order as if all were: the factor does not
-//! depend on what was kept. Updates of rectangles below 8 cells are not kept: there a rectangle is
-//! redone whole, in memory that stays in the cache.
+//! **Only what changed is factored again.** If all element matrices below a front are bit for bit
+//! the previous ones, the front keeps its part of the factor and its update. The fronts above cells
+//! that changed are recomputed with the same operations in the same order as in a full
+//! factorisation, so the factor does not depend on which parts were kept. Rectangles of up to 8
+//! cells per side are recomputed whole, in memory that stays in the cache; the updates inside them
+//! are not kept.
 //!
-//! **Threads** take subtrees of their own. Sums have one order, so that no bit of the result depends
-//! on their number.
+//! **Threads** process separate subtrees. The order of sums is fixed, so no bit of the result
+//! depends on the number of threads.
 
 mod factorize;
 mod substitute;
@@ -29,68 +31,76 @@ use std::sync::Arc;
 use substitute::{Sweep, Unknowns};
 use tree::{Source, Tree};
 
-/// Sides, in cells, of the largest rectangles that are redone whole.
+/// Longer side, in cells, of the largest rectangles that are recomputed whole.
 const KEPT_SIDE: u32 = 8;
 
-/// Subtrees are shared out among threads down to this depth.
+/// Depth of the tree down to which subtrees are distributed among threads.
 const SHARED_DEPTH: u32 = 4;
 
-/// Fewer fronts than this are not worth another thread.
+/// Largest subtree, in fronts, that is not divided among threads.
 const SHARED_FRONTS: u32 = 64;
 
-/// Memory for updates that are kept, in bytes; beyond it larger rectangles are redone whole.
+/// Largest memory for kept updates, in bytes; if it is exceeded, larger rectangles are recomputed
+/// whole.
 const KEPT_BYTES: usize = 6 << 30;
 
-/// The matrix is not positive definite.
+/// Error: the matrix is not positive definite.
 #[derive(Debug, thiserror::Error)]
 #[error("the matrix is not positive definite at skeleton unknown {unknown}")]
 pub struct NotPositiveDefinite {
+    /// Index of the unknown in the elimination order.
     pub unknown: usize,
 }
 
-/// What a factorisation took, beside what one of all fronts would.
+/// Work of a factorisation, and of one that computes all fronts.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Effort {
-    /// Entries of the factor that were computed.
+    /// Computed entries of the factor.
     pub entries: usize,
     /// Additions and multiplications.
     pub flops: f64,
+    /// Entries of the whole factor.
     pub all_entries: usize,
+    /// Additions and multiplications of a factorisation of all fronts.
     pub all_flops: f64,
-    /// Entries of updates that are kept.
+    /// Entries of kept updates.
     pub kept_entries: usize,
 }
 
-/// A factored matrix on the skeleton, with `D` unknowns per node.
+/// Factored matrix on the skeleton, with `D` unknowns per node.
 pub struct Multifrontal<const D: usize> {
     tree: Arc<Tree>,
     places: Places,
     simd: Simd,
     /// Panels of all fronts in postorder.
     factor: Vec<f64>,
-    /// Updates that are kept.
+    /// Kept updates.
     updates: Vec<f64>,
-    /// Of each front: own and rim unknowns of the vector being solved for.
+    /// Own and rim unknowns of each front, for the vector being solved for.
     vectors: Vec<f64>,
-    /// Updates that are not kept, per task.
+    /// Memory for updates that are not kept, per task.
     work: Vec<Vec<f64>>,
-    /// Whether the front is to be factored again.
+    /// Whether each front must be factored again.
     stale: Vec<bool>,
-    /// The front that each cell belongs to.
+    /// Front of each cell.
     leaf_of: Vec<u32>,
     effort: Effort,
 }
 
-/// Where the fronts' data are: each list has one entry more than there are fronts.
+/// Offsets of the data of the fronts; each list of offsets has one entry more than there are
+/// fronts.
 struct Places {
+    /// Offsets of the panels.
     panel: Vec<usize>,
-    /// Of no length where updates are not kept.
+    /// Offsets of the updates; updates that are not kept have length zero.
     update: Vec<usize>,
+    /// Offsets of the vectors.
     vector: Vec<usize>,
-    /// Whether the front and all below are redone together.
+    /// Whether the front and all fronts below it are recomputed together.
     whole: Vec<bool>,
 }
 
+/// Number of unknowns of a front.
 fn size<const D: usize>(tree: &Tree, f: usize) -> Size {
     let front = &tree.fronts[f];
     Size { own: D * front.own as usize, rim: D * front.rim.len() }
@@ -130,12 +140,13 @@ impl Places {
     }
 }
 
-/// Updates are kept of the largest rectangles that are redone whole, and of all above.
+/// Whether the update of a front is kept: the updates of the largest rectangles that are recomputed
+/// whole, and of all fronts above them.
 fn is_kept(tree: &Tree, f: usize, side: u32) -> bool {
     tree.fronts[f].side > side || tree.parent[f].is_none_or(|p| tree.fronts[p].side > side)
 }
 
-/// The data of some consecutive fronts, from front `first` on.
+/// Data of consecutive fronts, starting with front `first`.
 struct Part<'a> {
     places: &'a Places,
     first: usize,
@@ -149,7 +160,7 @@ impl Part<'_> {
         Part { places, first: *first, factor, updates }
     }
 
-    /// The fronts before `front`, and those from it on.
+    /// The fronts before `front`, and the fronts from `front` on.
     fn split(&mut self, front: usize) -> [Part<'_>; 2] {
         let Part { places, first, factor, updates } = self.reborrow();
         let (f0, f1) = factor.split_at_mut(places.panel[front] - places.panel[first]);
@@ -162,6 +173,7 @@ impl Part<'_> {
 }
 
 impl<const D: usize> Multifrontal<D> {
+    /// Allocates the factor; nothing is factored yet.
     pub fn new(tree: Arc<Tree>, cells: usize) -> Self {
         let places = Places::new::<D>(&tree);
         let fronts = tree.fronts.len();
@@ -190,29 +202,34 @@ impl<const D: usize> Multifrontal<D> {
         }
     }
 
+    /// The elimination tree.
     pub fn tree(&self) -> &Arc<Tree> {
         &self.tree
     }
+    /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
         D * self.tree.len()
     }
-    /// Of the last factorisation.
+    /// Work of the last factorisation.
     pub fn effort(&self) -> Effort {
         self.effort
     }
 
-    /// Lets the next factorisation compute all fronts.
+    /// Makes the next factorisation compute all fronts.
     pub fn forget(&mut self) {
         self.stale.fill(true);
     }
 
-    /// Says that a cell's matrix is not what it was at the last factorisation.
+    /// Marks the matrix of a cell as changed since the last factorisation.
     pub fn touch(&mut self, cell: usize) {
         self.stale[self.leaf_of[cell] as usize] = true;
     }
 
-    /// Factors again what lies above cells that changed. After a failure all fronts above those that
-    /// failed remain to be factored.
+    /// Factors the fronts above cells that changed.
+    ///
+    /// # Errors
+    /// Returns [`NotPositiveDefinite`] at the first pivot that is not positive. The fronts marked
+    /// for factorisation then stay marked.
     pub fn factorize(&mut self, cells: &[CellBlocks<D>]) -> Result<(), NotPositiveDefinite> {
         self.spread_stale();
         self.effort = self.effort_ahead();
@@ -225,6 +242,7 @@ impl<const D: usize> Multifrontal<D> {
         Ok(())
     }
 
+    /// Work of the next factorisation.
     fn effort_ahead(&self) -> Effort {
         let mut out = Effort { kept_entries: self.updates.len(), ..Effort::default() };
         for (f, &stale) in self.stale.iter().enumerate() {
@@ -239,7 +257,7 @@ impl<const D: usize> Multifrontal<D> {
         out
     }
 
-    /// What lies above stale fronts is stale; rectangles that are redone whole are so all of them.
+    /// Marks the fronts above stale fronts, and all fronts of a rectangle that is recomputed whole.
     fn spread_stale(&mut self) {
         for f in 0..self.stale.len() {
             if self.stale[f]
@@ -257,7 +275,8 @@ impl<const D: usize> Multifrontal<D> {
         }
     }
 
-    /// Solves with the factor; `x` in the elimination order.
+    /// Solves with the factor. `x` is in the elimination order: the right-hand side on entry, the
+    /// solution on return.
     pub fn solve(&mut self, x: &mut [f64]) {
         let Multifrontal { tree, places, simd, factor, vectors, .. } = self;
         let sweep = Sweep::<D> { tree, places, simd: *simd, factor };
@@ -268,7 +287,7 @@ impl<const D: usize> Multifrontal<D> {
     }
 }
 
-/// Entries that the updates below a front take while it is redone.
+/// Entries needed for the updates below a front while it is recomputed.
 fn workspace<const D: usize>(tree: &Tree, f: usize) -> usize {
     match tree.fronts[f].source {
         Source::Cells(_) => 0,
@@ -298,7 +317,7 @@ mod tests {
         mesh
     }
 
-    /// `G G' + I` of a random `G`, cell by cell.
+    /// The matrix `G G' + I` of a random `G` for each cell.
     fn matrices<const D: usize>(mesh: &Mesh, seed: u64) -> Vec<CellBlocks<D>> {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
         let n = 8 * D;
@@ -448,7 +467,8 @@ mod tests {
         };
         let (coarse, fine) = (effort(64), effort(256));
         let exponent = |a: f64, b: f64| (b / a).ln() / 16f64.ln();
-        // Short sides have smaller rims: the exponents come from above.
+        // On coarse meshes rims are relatively small, so the exponents approach their limits from
+        // above.
         let flops = exponent(coarse.all_flops, fine.all_flops);
         assert!(flops > 1.5 && flops < 1.6, "{flops}");
         let entries = exponent(coarse.all_entries as f64, fine.all_entries as f64);

@@ -1,4 +1,4 @@
-//! Forward and backward substitution along the tree.
+//! This module performs the forward and backward substitution along the tree.
 
 use super::*;
 use crate::simd::Simd;
@@ -8,31 +8,39 @@ use kernels::Columns;
 use std::ops::Range;
 use tree::{Run, Source, Tree};
 
-/// One solution.
+/// Inputs of one forward and backward substitution.
 pub(super) struct Sweep<'a, const D: usize> {
+    /// The elimination tree.
     pub(super) tree: &'a Tree,
+    /// Offsets of the data of the fronts.
     pub(super) places: &'a Places,
+    /// Instruction set of the kernels.
     pub(super) simd: Simd,
+    /// Panels of all fronts in postorder.
     pub(super) factor: &'a [f64],
 }
 
-/// Unknowns of a subtree: those that it eliminates, and the vectors of its fronts.
+/// Unknowns of a subtree.
 pub(super) struct Unknowns<'a> {
+    /// Unknowns that the subtree eliminates.
     pub(super) x: &'a mut [f64],
+    /// Vectors of its fronts.
     pub(super) vectors: &'a mut [f64],
 }
 
 impl<const D: usize> Sweep<'_, D> {
+    /// Columns of the factor of a front.
     pub(super) fn columns(&self, f: usize) -> Columns<'_> {
         let data = &self.factor[self.places.panel[f]..self.places.panel[f + 1]];
         Columns { data, ld: size::<D>(self.tree, f).rows() }
     }
 
+    /// Whether the children of a front are processed by separate threads.
     pub(super) fn is_shared(&self, f: usize, depth: u32) -> bool {
         depth > 0 && self.tree.fronts[f].subtree > SHARED_FRONTS
     }
 
-    /// The two children's parts of a subtree, and the front's own.
+    /// The unknowns of the two children, and the front's own.
     pub(super) fn split<'a>(&self, f: usize, u: Unknowns<'a>) -> [Unknowns<'a>; 3] {
         let [left, right] = self.tree.children(f);
         let (first, vector) = (self.tree.first_of(f), &self.places.vector);
@@ -45,8 +53,8 @@ impl<const D: usize> Sweep<'_, D> {
         [(xl, vl), (xr, vr), (x, v)].map(|(x, vectors)| Unknowns { x, vectors })
     }
 
-    /// Forward substitution in a subtree. Each front's vector then holds its own unknowns so far
-    /// and what they add to the right-hand side on its rim.
+    /// Forward substitution in a subtree. Afterwards the vector of each front holds its own
+    /// intermediate unknowns and their contribution to the right-hand side on its rim.
     pub(super) fn forward(&self, f: usize, u: Unknowns, depth: u32) {
         let size = size::<D>(self.tree, f);
         let vector = match &self.tree.fronts[f].source {
@@ -79,8 +87,8 @@ impl<const D: usize> Sweep<'_, D> {
         kernels::forward(self.simd, self.columns(f), own, rim);
     }
 
-    /// Backward substitution in a subtree, whose rim is known from the parent's vector. Each
-    /// front's vector then holds the solution.
+    /// Backward substitution in a subtree whose rim is known from the parent's vector. Afterwards
+    /// the vector of each front holds the solution.
     pub(super) fn backward(
         &self,
         f: usize,
@@ -117,18 +125,19 @@ impl<const D: usize> Sweep<'_, D> {
 }
 
 impl Unknowns<'_> {
+    /// The same unknowns, borrowed for a shorter time.
     pub(super) fn reborrow(&mut self) -> Unknowns<'_> {
         Unknowns { x: self.x, vectors: self.vectors }
     }
 }
 
-/// A front's vector before anything is added to it.
+/// Initialises the vector of a front: its own unknowns, and zero on the rim.
 pub(super) fn begin(size: Size, x: &[f64], vector: &mut [f64]) {
     vector[..size.own].copy_from_slice(x);
     vector[size.own..].fill(0.0);
 }
 
-/// Unknowns of the parent, and of the child's rim, that a run joins.
+/// The unknowns of the parent and of the child's rim that a run connects.
 pub(super) fn ends<const D: usize>(run: &Run) -> (Range<usize>, Range<usize>) {
     let range = |start: u32| D * start as usize..D * (start + run.len) as usize;
     (range(run.parent), range(run.child))

@@ -1,16 +1,17 @@
-//! The dissection of a mesh: a binary tree of rectangles of cells, and what each eliminates.
+//! This module computes the nested dissection of a mesh: a binary tree of rectangles of cells, and
+//! the nodes that each rectangle eliminates.
 //!
-//! A rectangle is halved across its longer side until few cells are left (nested dissection;
-//! George 1973). A *front* is what a rectangle adds to the factor: it eliminates its *own* nodes,
-//! those that no cell outside of it touches and no smaller rectangle has eliminated, and leaves a
-//! dense matrix on its *rim*, the nodes that it shares with the rest (Duff and Reid 1983). The node
-//! at a cell's centre is condensed before and is no part of this; a node that only solid cells
-//! touch is idle and no part of it either.
+//! A rectangle is halved across its longer side until few cells are left (nested dissection; George
+//! 1973). The *front* of a rectangle is its part of the factorisation. It eliminates its *own*
+//! nodes, those that no cell outside the rectangle touches and no smaller rectangle has eliminated.
+//! The result is a dense matrix on its *rim*, the nodes that it shares with the rest of the mesh
+//! (Duff and Reid 1983). The nodes at the centres of cells are condensed before and are not part of
+//! the tree; nodes that only solid cells touch are not part of it either.
 
 use super::super::element::SKELETON_NODES;
 use crate::space::mesh::Mesh;
 
-/// Cells along the sides of a rectangle that is not halved any more.
+/// Largest side, in cells, of a rectangle that is not halved.
 const LEAF_CELLS: usize = 2;
 
 /// Position of a node that is not eliminated.
@@ -19,7 +20,9 @@ pub const NO_POSITION: u32 = u32::MAX;
 /// Fronts in postorder: the subtree of front `f` is `f + 1 - fronts[f].subtree ..= f`.
 #[derive(Debug)]
 pub struct Tree {
+    /// The fronts.
     pub fronts: Vec<Front>,
+    /// Parent of each front; `None` for the root.
     pub parent: Vec<Option<usize>>,
     /// Mesh node of each position of the elimination order.
     pub node: Vec<u32>,
@@ -27,50 +30,59 @@ pub struct Tree {
     pub position: Vec<u32>,
 }
 
-/// One rectangle's part of the elimination. Its matrix has first its own nodes, then its rim.
+/// Elimination step of one rectangle. The rows of its matrix are its own nodes, then its rim.
 #[derive(Debug)]
 pub struct Front {
-    /// Position of the first own node; the others follow.
+    /// Position of the first own node; the other own nodes follow it.
     pub first: u32,
+    /// Number of own nodes.
     pub own: u32,
     /// Positions of the nodes on the rim, ascending.
     pub rim: Vec<u32>,
+    /// Matrices that the front is assembled from.
     pub source: Source,
-    /// Fronts of the subtree, this one included.
+    /// Number of fronts of the subtree, including this one.
     pub subtree: u32,
-    /// Cells of the longer side.
+    /// Number of cells of the longer side.
     pub side: u32,
 }
 
-/// What a front is assembled from.
+/// Matrices that a front is assembled from.
 #[derive(Debug)]
 pub enum Source {
+    /// Element matrices of cells.
     Cells(Vec<LeafCell>),
-    /// For each of two children, where its rim lies among this front's nodes.
+    /// Updates of two children, each with the positions of its rim among this front's nodes.
     Children([Vec<Run>; 2]),
 }
 
-/// A cell, and where its eight nodes are in the front.
+/// A cell and the positions of its eight skeleton nodes in the front.
 #[derive(Debug)]
 pub struct LeafCell {
+    /// Index of the cell.
     pub cell: u32,
+    /// Index of each node in the front.
     pub nodes: [u16; 8],
 }
 
 /// Nodes `child..child + len` of a child's rim are nodes `parent..parent + len` of the front.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
+    /// First node in the child's rim.
     pub child: u32,
+    /// First node in the front.
     pub parent: u32,
+    /// Number of nodes.
     pub len: u32,
 }
 
 impl Front {
+    /// Number of nodes of the front.
     pub fn nodes(&self) -> usize {
         self.own as usize + self.rim.len()
     }
 
-    /// Where the node of this position is in the front.
+    /// Index in the front of the node with this position.
     fn index_of(&self, position: u32) -> u32 {
         if position < self.first + self.own {
             position - self.first
@@ -81,6 +93,7 @@ impl Front {
 }
 
 impl Tree {
+    /// Computes the dissection of a mesh.
     pub fn new(mesh: &Mesh) -> Self {
         let mut build = Build {
             mesh,
@@ -105,16 +118,17 @@ impl Tree {
         tree
     }
 
-    /// Nodes that are eliminated.
+    /// Number of nodes that are eliminated.
     pub fn len(&self) -> usize {
         self.node.len()
     }
 
+    /// Whether no node is eliminated.
     pub fn is_empty(&self) -> bool {
         self.node.is_empty()
     }
 
-    /// The two children of a front that has some.
+    /// The two children of a front that is not a leaf.
     pub fn children(&self, front: usize) -> [usize; 2] {
         let right = front - 1;
         [right - self.fronts[right].subtree as usize, right]
@@ -125,7 +139,8 @@ impl Tree {
         front + 1 - self.fronts[front].subtree as usize
     }
 
-    /// Rims hold mesh nodes while the tree grows; all positions are known only now.
+    /// Replaces mesh nodes by positions in the rims; the positions are known only when the tree is
+    /// complete.
     fn number_rims(&mut self, mesh: &Mesh) {
         for front in &mut self.fronts {
             front.rim.iter_mut().for_each(|n| *n = self.position[*n as usize]);
@@ -142,6 +157,7 @@ impl Tree {
         }
     }
 
+    /// Finds the positions of the nodes of the cells of a leaf.
     fn locate_cells(&mut self, mesh: &Mesh, f: usize) {
         let (front, position) = (&self.fronts[f], &self.position);
         let locate = |c: &LeafCell| {
@@ -154,6 +170,7 @@ impl Tree {
         }
     }
 
+    /// Runs of nodes of a child's rim in its parent.
     fn runs(&self, child: usize, parent: usize) -> Vec<Run> {
         let front = &self.fronts[parent];
         let mut runs: Vec<Run> = Vec::new();
@@ -168,7 +185,7 @@ impl Tree {
     }
 }
 
-/// Cells by column and row, ends excluded.
+/// A rectangle of cells: ranges of columns and rows, ends excluded.
 #[derive(Clone, Copy)]
 struct Rectangle {
     i: [usize; 2],
@@ -176,9 +193,11 @@ struct Rectangle {
 }
 
 impl Rectangle {
+    /// The two halves of the rectangle; `None` if it is a leaf.
     fn halves(self) -> Option<[Rectangle; 2]> {
         let half = |[a, b]: [usize; 2]| {
-            // A multiple of the leaf's size from the start: the other end may have odd leaves.
+            // The middle is a multiple of the leaf's size from the start, so only the other end has
+            // odd leaves.
             let middle = a + (b - a).div_ceil(2).next_multiple_of(LEAF_CELLS);
             [[a, middle], [middle, b]]
         };
@@ -193,18 +212,20 @@ impl Rectangle {
     }
 }
 
-/// A node that cells outside of the rectangle may touch, and how often cells inside do.
+/// A node that cells outside the rectangle may touch, and the number of times that cells inside
+/// touch it.
 type Open = (u32, u32);
 
 struct Build<'a> {
     mesh: &'a Mesh,
-    /// How often cells touch each node.
+    /// Number of times that cells touch each node.
     incidences: Vec<u32>,
     tree: Tree,
 }
 
 impl Build<'_> {
-    /// Appends the fronts of a rectangle; the nodes on its rim, unless all of it is solid.
+    /// Appends the fronts of a rectangle; returns the nodes on its rim, or `None` if all its cells
+    /// are solid.
     fn dissect(&mut self, r: Rectangle) -> Option<Vec<Open>> {
         let start = self.tree.fronts.len();
         let (open, source) = match r.halves() {
@@ -232,6 +253,7 @@ impl Build<'_> {
         Some(rim)
     }
 
+    /// Nodes and cells of a leaf; `None` if all its cells are solid.
     fn leaf(&self, r: Rectangle) -> Option<(Vec<Open>, Source)> {
         let mesh = self.mesh;
         let all = (r.j[0]..r.j[1]).flat_map(|j| (r.i[0]..r.i[1]).map(move |i| mesh.cell(i, j)));
@@ -251,6 +273,7 @@ fn skeleton_nodes(mesh: &Mesh, cell: usize) -> [u32; 8] {
     SKELETON_NODES.map(|a| nodes[a] as u32)
 }
 
+/// Number of times that cells touch each node.
 fn incidences(mesh: &Mesh) -> Vec<u32> {
     let mut count = vec![0; mesh.nodes()];
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
@@ -259,7 +282,7 @@ fn incidences(mesh: &Mesh) -> Vec<u32> {
     count
 }
 
-/// Both lists as one, by node, with counts added.
+/// Merges two lists by node and adds the counts.
 fn merge(mut a: Vec<Open>, b: Vec<Open>) -> Vec<Open> {
     a.extend(b);
     a.sort_unstable();

@@ -1,5 +1,5 @@
-//! The terms of the balances of momentum and angular momentum: one file states one formula and owns
-//! its contribution to matrix, load and power.
+//! This module holds the terms of the balances of momentum and angular momentum. Each file states
+//! one formula and computes its contribution to the matrix, the load and the power.
 //!
 //! | term | file | matrix | load |
 //! |---|---|---|---|
@@ -7,11 +7,11 @@
 //! | coupling beyond the shear viscosity | [`rotation`] | yes | |
 //! | pressure and incompressibility | [`pressure`] | penalty | |
 //! | weight of the materials | [`weight`] | | yes |
-//! | stable strata ahead of time | [`restoring`] | yes | yes |
+//! | restoring force of stable stratification | [`restoring`] | yes | yes |
 //! | body forces and tractions fixed in space | [`plan::loads`](crate::plan::loads) | | yes |
 //!
-//! The first three exist in every cell and are called by name. [`Terms`] lists those that only some
-//! scenes have: what the plan does not call for is not in the list.
+//! The first three exist in every cell and are called by name. [`Terms`] lists the terms that only
+//! some scenes have.
 
 pub mod pressure;
 pub mod restoring;
@@ -23,15 +23,15 @@ use crate::plan::Plan;
 use crate::space::shape::NODES;
 use restoring::Restoring;
 
-/// A term over whole cells that acts on velocities, symmetric and positive.
+/// A symmetric positive term on whole cells that acts on velocities.
 pub trait CellTerm: Send + Sync {
-    /// Whether it contributes to a cell.
+    /// Whether the term contributes to a cell.
     fn acts_on(&self, cell: usize) -> bool;
 
-    /// Entry of a cell's matrix for nodes `a`, `b` and components `c`, `d`.
+    /// Entry of the matrix of a cell for nodes `a`, `b` and components `c`, `d`.
     fn entry(&self, cell: usize, nodes: [usize; 2], components: [usize; 2]) -> f64;
 
-    /// Forces on the nodes of a cell whose velocities are `u`, and the power that they take from the
+    /// Forces on the nodes of a cell with the velocities `u`, and the power that they take from the
     /// flow.
     fn force(
         &self,
@@ -44,22 +44,22 @@ pub trait CellTerm: Send + Sync {
 /// A side of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CellFace {
-    /// The cell whose matrix takes the term.
+    /// The cell whose matrix receives the term.
     pub cell: usize,
     /// Index into [`SIDE_NODES`](crate::space::shape::SIDE_NODES): left, right, bottom, top.
     pub side: usize,
 }
 
-/// A term on faces that acts on velocities, symmetric and positive.
+/// A symmetric positive term on faces that acts on velocities.
 pub trait FaceTerm: Send + Sync {
-    /// The faces on which it acts, in ascending order of their cells.
+    /// The faces on which the term acts, in ascending order of their cells.
     fn faces(&self) -> &[CellFace];
 
     /// Entry of the matrix for the `k`th and `l`th node of a face and components `c`, `d`; `face`
-    /// counts in [`FaceTerm::faces`].
+    /// is an index into [`FaceTerm::faces`].
     fn entry(&self, face: usize, nodes: [usize; 2], components: [usize; 2]) -> f64;
 
-    /// Forces on the nodes of a face whose velocities are `u`, and the power that they take from the
+    /// Forces on the nodes of a face with the velocities `u`, and the power that they take from the
     /// flow.
     fn force(&self, face: usize, nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], f64);
 }
@@ -67,14 +67,14 @@ pub trait FaceTerm: Send + Sync {
 /// Terms that only some scenes have.
 #[derive(Default)]
 pub struct Terms {
-    /// Stable stratification at large steps.
+    /// Restoring force of stable stratification at large steps.
     pub restoring: Restoring,
-    /// Terms on faces that do not change during a run.
+    /// Further terms on faces, constant during a run.
     faces: Vec<Box<dyn FaceTerm>>,
 }
 
 impl Terms {
-    /// The terms that a plan calls for.
+    /// The terms that a plan needs.
     pub fn of(_plan: &Plan) -> Self {
         Terms { restoring: Restoring::default(), faces: vec![] }
     }

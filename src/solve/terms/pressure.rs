@@ -1,25 +1,25 @@
-//! The pressure term, `-p div u~ - p~ div u`: the divergence matrix of the pressure basis, and the
-//! penalty of the augmented Lagrangian.
+//! This module computes the pressure term, `-p div u~ - p~ div u`: the divergence matrix of the
+//! pressure basis, and the penalty of the augmented Lagrangian.
 //!
 //! ```text
 //! B_qa = integral q d/dx N_a  (and d/dy),   force B' p,   residual B u + C p,   penalty B' W B
 //! ```
-//! The discontinuous linear pressure of a cell is eliminated with it; see
+//! The discontinuous linear pressure is eliminated cell by cell; see
 //! [`stokes`](crate::solve::stokes).
 
 use crate::solve::element::{Matrix, Nodal};
 use crate::space::measure::CellMeasure;
 use crate::space::shape::{D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, NODES, Table};
 
-/// `integral q d/dx N` and `integral q d/dy N` on a cell: the divergence matrix of the pressure
-/// basis `1, xi, eta`, as tables of the reference cell and what they are multiplied with.
+/// Divergence matrix of a cell for the pressure basis `1, xi, eta`, `integral q d/dx N` and
+/// `integral q d/dy N`: tables of the reference cell and the factors they are multiplied by.
 #[derive(Clone, Copy)]
 pub struct Divergence {
     x_scale: f64,
     y_scale: f64,
 }
 
-/// The matrices of a cell of size 2 x 2 for `d/dx` and `d/dy`, divided by its area.
+/// Matrices of a cell of size 2 x 2 for `d/dx` and `d/dy`, divided by its area.
 static REFERENCE_DIVERGENCE: [[[f64; NODES]; 3]; 2] =
     [reference_divergence(&D_XI_AT_GAUSS), reference_divergence(&D_ETA_AT_GAUSS)];
 
@@ -38,13 +38,13 @@ const fn reference_divergence(slope: &Table) -> [[f64; NODES]; 3] {
 }
 
 impl Divergence {
-    /// The divergence matrix of a cell.
+    /// Divergence matrix of a cell.
     pub fn new(cell: CellMeasure) -> Self {
         let [x_scale, y_scale] = cell.divergence_scales();
         Divergence { x_scale, y_scale }
     }
 
-    /// `B u`
+    /// `B u`.
     pub fn apply<const D: usize>(&self, u: &Nodal<D>) -> [f64; 3] {
         let [x, y] = &REFERENCE_DIVERGENCE;
         let mut sum = [[0.0; 3]; 2];
@@ -57,7 +57,7 @@ impl Divergence {
         std::array::from_fn(|q| self.x_scale * sum[0][q] + self.y_scale * sum[1][q])
     }
 
-    /// `f += B^T p`
+    /// `f += B^T p`.
     pub fn add_transposed<const D: usize>(&self, p: &[f64; 3], f: &mut Nodal<D>) {
         let [x, y] = &REFERENCE_DIVERGENCE;
         let (px, py) = (p.map(|p| self.x_scale * p), p.map(|p| self.y_scale * p));
@@ -67,7 +67,7 @@ impl Divergence {
         }
     }
 
-    /// `k += B^T diag(w) B`, on and below the diagonal of components.
+    /// `k += B^T diag(w) B`, in the blocks of components on and below the diagonal.
     pub fn add_penalty(&self, w: &[f64; 3], k: &mut Matrix) {
         let [x, y] = &REFERENCE_DIVERGENCE;
         for q in 0..3 {

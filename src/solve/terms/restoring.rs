@@ -1,35 +1,36 @@
-//! Stable stratification at large steps.
+//! This module stabilises stable stratification at large time steps.
 //!
-//! Where density grows along gravity, displaced fluid is driven back; the restoring load of the
-//! end of a step, taken from its start, overshoots once the step exceeds the relaxation time, and
-//! the surface sloshes ("drunken sailor", Kaus, Muehlhaus & May 2010, Phys. Earth Planet. Inter.
-//! 181, 12-20). Their remedy is the load a share `theta` of the next step ahead,
+//! Where density grows along gravity, displaced fluid is driven back. The restoring load at the end
+//! of a step, computed from its start, overshoots if the step exceeds the relaxation time, and the
+//! surface sloshes ("drunken sailor", Kaus, Muehlhaus & May 2010, Phys. Earth Planet. Inter. 181,
+//! 12-20). Their remedy is the load at a fraction `theta` of the next step ahead,
 //! `rho g - theta dt (u . grad rho) g`. Here its symmetric positive part acts on the *change* of
-//! the velocity since the solution before,
+//! the velocity since the previous solution,
 //!
 //! ```text
 //! + theta dt integral c ((u - u_before).e) (v.e),    c = |g| max(0, d rho/d e),   e = g/|g|
 //! ```
-//! so that the matrix stays symmetric positive definite, the solution is that of the particles'
-//! places to second order in `dt` whatever `c` leaves out, and nothing at all is added to a steady
-//! flow. With the velocity extrapolated to the middle of the next step, a relaxing mode
+//! The matrix therefore stays symmetric positive definite, the solution is that of the current
+//! positions of the particles to second order in `dt` whatever `c` omits, and a steady flow is
+//! unchanged. With the velocity extrapolated to the middle of the next step, a relaxing mode
 //! `x' = -lambda x` then decays at any step for `theta > 1/2`: for `lambda dt -> infinity` its
 //! factor per step solves `theta r^2 + (3/2 - 2 theta) r + theta - 1/2 = 0` (`|r| = 0.58` for 3/4).
-//! Without it, extrapolation is stable up to `lambda dt = 1`. The error of a step,
+//! Without the term, extrapolation is stable up to `lambda dt = 1`. The error of a step,
 //! `(5/12 - theta) dt^3 x'''`, is no larger than before.
 //!
-//! The gradient of the density is that of its mean in each cell: jumps across faces. A level at the
-//! share `s` of a cell puts the parts `1 - s` and `s` of its jump on the faces below and above: the
-//! jump and its place are exact. Faces have only nodes that cells share, so that the matrices of
-//! uniform cells stay as they are.
+//! The gradient of the density is that of its cell means: jumps across faces. An interface at the
+//! fraction `s` of the height of a cell contributes the parts `1 - s` and `s` of its jump to the
+//! faces below and above, so the jump and its position are exact. All nodes of a face are shared by
+//! cells, so the matrices of uniform cells do not change.
 //!
-//! A level inside a cell also moves with the velocity of the cell's middle, which no face feels, and
-//! which only the weaker fluid resists. So the gradient of the density inside a cut cell, as its
-//! weight has it, adds such a term over the cell. There it acts on both components: the weight of
-//! a cut cell also follows the weaker fluid as it slides along the interface, at right angles to
-//! gravity. Without it, steps beyond about 200 times `eta_weak/(rho g h)` amplify rounding to speeds
-//! of the order `rho g h^2/eta_weak`: heavy fluid at rest below one a million times thinner, in steps
-//! of a thousandth of its own relaxation time.
+//! An interface inside a cell also moves with the velocity at the centre of the cell, which acts on
+//! no face and which only the weaker fluid resists. The gradient of the density inside a cut cell,
+//! as its weight uses it, therefore adds such a term over the cell. There it acts on both
+//! components, because the weight of a cut cell also changes as the weaker fluid slides along the
+//! interface, at right angles to gravity. Without this term, steps beyond about 200 times
+//! `eta_weak/(rho g h)` amplify rounding to speeds of the order `rho g h^2/eta_weak`: for heavy
+//! fluid at rest below a fluid a million times thinner, this happens at a thousandth of the heavy
+//! fluid's relaxation time.
 
 use super::{CellFace, CellTerm, FaceTerm};
 use crate::solve::density::Density;
@@ -37,60 +38,64 @@ use crate::space::mesh::Mesh;
 use crate::space::neighbours::Face;
 use crate::space::shape::NODES;
 
-/// Mass of the quadratic functions on a line, over its length.
+/// Mass matrix of the quadratic functions on a line, divided by its length.
 pub const LINE_MASS: [[f64; 3]; 3] = [
     [4.0 / 30.0, 2.0 / 30.0, -1.0 / 30.0],
     [2.0 / 30.0, 16.0 / 30.0, 2.0 / 30.0],
     [-1.0 / 30.0, 2.0 / 30.0, 4.0 / 30.0],
 ];
-/// Jumps smaller than this share of the largest density are rounding.
+/// Smallest jump of the density, as a fraction of the largest density; smaller ones are rounding.
 const LEAST_JUMP: f64 = 1e-13;
 
-/// Terms inside cells come in where the restoring force of a step exceeds the weakest viscosity
-/// this many times: half of where rounding begins to be amplified without them.
+/// Ratio of the restoring force of a step to the weakest viscosity at which the terms inside cells
+/// reach half their strength: half the ratio at which rounding is amplified without them.
 const SUBCELL_STEP: f64 = 100.0;
 
-/// Strength of the terms inside cells over that of the faces': they must outweigh what the weight of
-/// a cut cell answers to without symmetry, the slip of one fluid past the other. Heavy fluid at rest
-/// below one a million times thinner, 12 cells, levels at 6 shares of a cell, in steps of 1 relaxation
-/// time: 1 lets one of them grow, 2 and more none; in steps of 100 the slowest growth is at 3 and 4.
+/// Factor on the terms inside cells relative to those on faces. They must outweigh the unsymmetric
+/// response of the weight of a cut cell to the slip of one fluid past the other. Test: heavy fluid
+/// at rest below a fluid a million times thinner, 12 cells, interfaces at 6 heights in a cell. In
+/// steps of 1 relaxation time, rounding grows at one of the heights with a factor of 1 and at none
+/// with 2 and more; in steps of 100, growth is slowest with 3 and 4.
 const SUBCELL_STRENGTH: f64 = 3.0;
 
-/// What restoring loads are taken for.
+/// Parameters of the restoring term.
 #[derive(Clone, Copy, Debug)]
 pub struct Ahead {
+    /// Gravitational acceleration, in the plan's units.
     pub gravity: [f64; 2],
-    /// How far ahead of the solution.
+    /// Time `theta dt` ahead of the solution, in the plan's units.
     pub time: f64,
-    /// Smallest viscosity of the scene.
+    /// Smallest viscosity of the scene, in the plan's units.
     pub weakest: f64,
 }
 
-/// The terms of all faces that have one.
+/// The restoring terms of all faces and cells that have one.
 #[derive(Clone, Debug, Default)]
 pub struct Restoring {
+    /// Faces with a term.
     faces: Vec<CellFace>,
-    /// Force per velocity of each face: `theta dt c` integrated over it.
+    /// Force per velocity of each face: `theta dt c` integrated over the face.
     strength: Vec<f64>,
-    /// Force per velocity, over each cell; empty if there are no terms.
+    /// Force per velocity of each cell; empty if there are no terms.
     cells: Vec<f64>,
-    /// `e`
+    /// Unit vector `e` along gravity.
     direction: [f64; 2],
-    /// `u_before` at the nodes.
+    /// Velocity `u_before` at the nodes.
     before: Vec<[f64; 2]>,
     /// Mean density of each cell.
     mean: Vec<f64>,
 }
 
 impl Restoring {
-    /// No terms.
+    /// Removes all terms.
     pub fn clear(&mut self) {
         self.faces.clear();
         self.strength.clear();
         self.cells.clear();
     }
 
-    /// From the density of the cells, and the velocity of the solution before at the nodes.
+    /// Computes the terms from the density of the cells; `before` yields the velocity of the
+    /// previous solution at the nodes.
     pub fn update(
         &mut self,
         mesh: &Mesh,
@@ -129,13 +134,13 @@ impl Restoring {
             if x + y <= least {
                 return 0.0;
             }
-            // Faces alone have the whole gradient: at short steps these terms would count it twice.
+            // The faces contain the whole gradient: at short steps this term would count it twice.
             let restoring = measure.times(SUBCELL_STRENGTH * ahead * g * growth);
             restoring * restoring / (restoring + SUBCELL_STEP * weakest * measure.depth())
         }));
     }
 
-    /// Force per velocity over a cell; zero where it has no term of its own.
+    /// Force per velocity over a cell; zero if the cell has no term.
     fn cell_strength(&self, cell: usize) -> f64 {
         self.cells.get(cell).copied().unwrap_or(0.0)
     }
@@ -148,7 +153,7 @@ impl CellTerm for Restoring {
 
     fn entry(&self, cell: usize, [a, b]: [usize; 2], [c, d]: [usize; 2]) -> f64 {
         let mass = LINE_MASS[a % 3][b % 3] * LINE_MASS[a / 3][b / 3];
-        // Both components alike.
+        // The same term acts on both components.
         if c == d { self.cell_strength(cell) * mass } else { 0.0 }
     }
 

@@ -1,17 +1,20 @@
-//! The part of the coupling viscosity that exceeds the shear viscosity, without locking.
+//! This module computes the part of the coupling viscosity that exceeds the shear viscosity,
+//! without locking.
 //!
 //! As `eta_c -> infinity` at fixed `M` (the couple-stress limit) the rotation must follow the spin,
-//! `o = w`. The spin of a biquadratic velocity is of another shape than a biquadratic rotation, and
-//! nine points ask more of both than they can give: measured on the coupled cell, the velocity then
-//! converges at second order instead of third. So what `eta_c` has beyond `eta` acts on the relative
-//! spin `s = o - w` only through its best linear function of the cell's coordinates,
+//! `o = w`. The spin of a biquadratic velocity and a biquadratic rotation lie in different function
+//! spaces, and nine points impose more conditions than both can satisfy: on the coupled cell, the
+//! velocity then converges at second order instead of third. Therefore the excess of `eta_c` over
+//! `eta` acts only on the best linear approximation, in the coordinates of the cell, of the
+//! relative spin `s = o - w`,
 //!
 //! ```text
 //! 4 integral e Ps Ps~,   e = max(0, eta_c - eta),   P: weighted by e on 1, xi, eta
 //! ```
-//! which is what the pressure sees of the divergence, and the rest acts everywhere. Fluids with
-//! `eta_c <= eta` have no such part. The error made is that of `e (s - Ps)(s~ - Ps~)`, of fourth
-//! order where `s` is smooth. A weak point of a cut cell weighs little in `P`.
+//! as the pressure acts only on the linear part of the divergence. The rest of `eta_c` acts at
+//! every point. Fluids with `eta_c <= eta` have no excess. The error is that of
+//! `e (s - Ps)(s~ - Ps~)`, of fourth order where `s` is smooth. A weak point of a cut cell has a
+//! small weight in `P`.
 
 use crate::solve::element::{LOCAL, Matrix, Nodal, PointShape};
 use crate::solve::quadrature::Quadrature;
@@ -19,21 +22,23 @@ use crate::space::measure::CellMeasure;
 use crate::space::shape::NODES;
 use std::cell::RefCell;
 
-/// A function that is this small a part of what it was before it was made orthogonal to others is
-/// rounding.
+/// Smallest fraction of the squared norm of a function that must remain after orthogonalisation;
+/// less is rounding. Also the smallest fraction of the coupling viscosity that counts as an excess.
 const LEAST_PART: f64 = 1e-10;
 
-/// The projected coupling of a cell: `sum_k b_k b_k'`.
+/// Projected coupling of a cell: `sum_k b_k b_k'`.
 #[derive(Default)]
 pub struct RotationModes {
+    /// The vectors `b_k`.
     modes: [[f64; LOCAL]; 3],
-    /// Of those, that are there.
+    /// Number of vectors.
     count: usize,
 }
 
-/// What modes are made in, kept by each thread.
+/// Working memory for computing modes, one per thread.
 #[derive(Default)]
 struct Room {
+    /// Points with an excess.
     points: Vec<Point>,
     /// Orthonormal functions, by point.
     basis: [Vec<f64>; 3],
@@ -43,7 +48,8 @@ thread_local! {
     static ROOM: RefCell<Room> = RefCell::default();
 }
 
-/// An integration point: `4 e` times its volume, `1, xi, eta`, and `s` of unit values.
+/// An integration point: its weight `4 e` times the volume, the functions `1, xi, eta`, and the
+/// relative spin `s` of unit values of the unknowns.
 struct Point {
     weight: f64,
     linear: [f64; 3],
@@ -51,14 +57,14 @@ struct Point {
 }
 
 impl RotationModes {
-    /// Of a cell with rotation; `None` where no point has an excess.
+    /// Computes the modes of a cell with rotation; `None` if no point has an excess.
     pub fn new(quadrature: &Quadrature, cell: usize, measure: CellMeasure) -> Option<Self> {
         let volume = measure.volume();
         ROOM.with_borrow_mut(|Room { points, basis }| {
             points.clear();
             quadrature.for_points(cell, |p, shape| {
                 let excess = p.law.excess_coupling();
-                // The part of the shear viscosity of rounding is none.
+                // An excess of the order of rounding is ignored.
                 if excess > LEAST_PART * p.law.coupling {
                     let s = PointShape::new(shape, measure.size);
                     let mut spin = [0.0; LOCAL];
@@ -75,7 +81,7 @@ impl RotationModes {
         })
     }
 
-    /// `basis`: room.
+    /// Computes the modes of these points; `basis` is working memory.
     fn of(points: &[Point], basis: &mut [Vec<f64>; 3]) -> Self {
         let product = |a: &[f64], b: &[f64]| -> f64 {
             points.iter().zip(a.iter().zip(b)).map(|(p, (a, b))| p.weight * a * b).sum()
@@ -87,7 +93,7 @@ impl RotationModes {
             f.clear();
             f.extend(points.iter().map(|p| p.linear[k]));
             let before = product(f, f);
-            // Twice: the first pass leaves rounding of the parts it takes away.
+            // Twice, because the first pass leaves rounding errors of the parts it removes.
             for q in known.iter().chain(&*known) {
                 let along = product(q, f);
                 f.iter_mut().zip(q).for_each(|(f, q)| *f -= along * q);
@@ -107,11 +113,13 @@ impl RotationModes {
         out
     }
 
+    /// The valid vectors.
     fn modes(&self) -> &[[f64; LOCAL]] {
         &self.modes[..self.count]
     }
 
-    /// Adds to an element matrix, on and below the diagonal of components.
+    /// Adds the coupling to an element matrix, in the blocks of components on and below the
+    /// diagonal.
     pub fn add_stiffness(&self, k: &mut Matrix) {
         for b in self.modes() {
             for i in 0..LOCAL {
@@ -122,7 +130,7 @@ impl RotationModes {
         }
     }
 
-    /// Adds to the nodal forces; the power.
+    /// Adds the coupling to the nodal forces and returns its power.
     pub fn add_force<const D: usize>(&self, u: &Nodal<D>, force: &mut Nodal<D>) -> f64 {
         let mut power = 0.0;
         for b in self.modes() {
@@ -179,7 +187,7 @@ mod tests {
 
     #[test]
     fn points_without_weight_leave_fewer_functions() {
-        // One column of points tells nothing about slopes along x.
+        // One column of points does not determine slopes along x.
         let column = points(|_| 1.0).into_iter().skip(1).step_by(3).collect::<Vec<_>>();
         let count = |points: &[Point]| RotationModes::of(points, &mut Default::default()).count;
         assert_eq!(count(&column), 2);

@@ -1,13 +1,14 @@
-//! The viscous term: stresses of the materials at the integration points of a cell.
+//! This module computes the viscous term: the stresses of the materials at the integration points
+//! of a cell.
 //!
 //! Per volume, with `d = (D_xx - D_yy, 2 D_xy)` and the spin `o = (v,x - u,y)/2`,
 //!
 //! ```text
 //! d.S d~ + beta tr(D) tr(D~) + 4 eta_c (o - w)(o~ - w~) + M grad w . grad w~
 //! ```
-//! Of the coupling viscosity only what does not exceed the shear viscosity is integrated point by
-//! point; [`rotation`](super::rotation) does the rest. Forces of cells whose points are those of the
-//! Gauss rule are computed eight cells at a time by sum factorisation.
+//! The coupling viscosity is integrated point by point only up to the shear viscosity;
+//! [`rotation`](super::rotation) adds the excess. The forces of cells with the points of the Gauss
+//! rule are computed for eight cells at a time by sum factorisation.
 
 use super::rotation::RotationModes;
 use crate::composition::Content;
@@ -20,8 +21,8 @@ use crate::solve::quadrature::Quadrature;
 use crate::space::measure::CellMeasure;
 use crate::space::shape::{GAUSS_3_WEIGHTS, NODES, SLOPES_AT_GAUSS, VALUES_AT_GAUSS};
 
-/// Stresses at a point times its volume, by what they are conjugate to: their virtual power is
-/// `sum_c x[c] du_c/dx + y[c] du_c/dy + w w~`.
+/// Stresses at a point times its volume, by the derivatives they are conjugate to: their virtual
+/// power is `sum_c x[c] du_c/dx + y[c] du_c/dy + w w~`.
 #[derive(Clone, Copy)]
 pub struct Stress<const D: usize> {
     x: [f64; D],
@@ -30,6 +31,7 @@ pub struct Stress<const D: usize> {
 }
 
 impl<const D: usize> Stress<D> {
+    /// Stresses of a law at the rates `r`, multiplied by the volume of the point.
     #[inline(always)]
     pub fn new(law: &PointLaw, r: &Rates, volume: f64) -> Self {
         let stress = law.stress(r, volume);
@@ -44,7 +46,7 @@ impl<const D: usize> Stress<D> {
         out
     }
 
-    /// Adds the virtual power to the nodal forces.
+    /// Adds the virtual power of the stresses to the nodal forces.
     pub fn add_force(&self, s: &PointShape, f: &mut Nodal<D>) {
         for a in 0..NODES {
             for c in 0..D {
@@ -57,20 +59,23 @@ impl<const D: usize> Stress<D> {
     }
 }
 
-/// What a cell's stresses do: nodal forces, and powers that come with them.
+/// Internal forces of a cell, with its dissipation and strain.
 #[derive(Clone, Copy)]
 pub struct Internal<const D: usize> {
+    /// Internal forces on the nodes.
     pub force: Nodal<D>,
+    /// Viscous dissipation.
     pub dissipation: f64,
-    /// `integral D:D`
+    /// `integral D:D`.
     pub strain: f64,
 }
 
 impl<const D: usize> Internal<D> {
     const NONE: Self = Internal { force: [[0.0; D]; NODES], dissipation: 0.0, strain: 0.0 };
 
-    /// Of up to [`TOGETHER`] cells. `rotation`: of all cells; `of(cell)`: its measure and nodal values, `None`
-    /// for a solid one.
+    /// Computes the internal forces of up to [`TOGETHER`] cells. `rotation` holds the modes of all
+    /// cells of the mesh. `of(cell)` returns the measure and the nodal values of a cell, `None` for
+    /// a solid cell.
     pub fn of_cells(
         simd: Simd,
         quadrature: &Quadrature,
@@ -119,6 +124,7 @@ impl<const D: usize> Internal<D> {
         out
     }
 
+    /// Adds the forces of the stiffness of a cut cell.
     fn add_cut(&mut self, cut: &CutStiffness, u: &Nodal<D>) {
         let flat: [f64; 2 * NODES] = std::array::from_fn(|j| u[j % NODES][j / NODES]);
         for (i, row) in cut.matrix.iter().enumerate() {
@@ -128,6 +134,7 @@ impl<const D: usize> Internal<D> {
         }
     }
 
+    /// Internal forces of a cell whose points are not those of the Gauss rule.
     fn at_any_points(
         quadrature: &Quadrature,
         cell: usize,
@@ -143,7 +150,7 @@ impl<const D: usize> Internal<D> {
         out
     }
 
-    /// Stress at a point, whose powers are added.
+    /// Stress at a point; adds its dissipation and strain to the sums.
     #[inline(always)]
     fn stress(&mut self, p: &IntegrationPoint, r: &Rates, measure: CellMeasure) -> Stress<D> {
         let volume = measure.times(p.weight);
@@ -153,25 +160,26 @@ impl<const D: usize> Internal<D> {
     }
 }
 
-/// Cells whose stresses are computed together, one to a place of a vector.
+/// Number of cells whose stresses are computed together, one per lane of a vector.
 pub const TOGETHER: usize = 8;
 
-/// A number of each of them.
+/// One number for each of these cells.
 type Lanes = [f64; TOGETHER];
 
-/// Cells whose points are those of the Gauss rule: nodal values, then nodal forces.
+/// Cells with the points of the Gauss rule: nodal values at first, nodal forces afterwards.
 struct Together<const D: usize> {
-    /// By component and node.
+    /// Values by component and node.
     nodal: [[Lanes; NODES]; D],
+    /// Laws at the nine points.
     laws: [LawLanes; 9],
-    /// Reference coordinates per length.
+    /// Reference coordinates per length, along x and y.
     per_length: [Lanes; 2],
     volume: Lanes,
     dissipation: Lanes,
     strain: Lanes,
 }
 
-/// A [`PointLaw`] of each cell.
+/// One [`PointLaw`] for each cell.
 #[derive(Clone, Copy)]
 struct LawLanes {
     shear: [Lanes; 3],
@@ -206,7 +214,7 @@ impl LawLanes {
 }
 
 impl<const D: usize> Together<D> {
-    /// Places that no cell takes have no stiffness.
+    /// Lanes without a cell have no stiffness.
     const EMPTY: Self = Together {
         nodal: [[ZERO; NODES]; D],
         laws: [LawLanes::ZERO; 9],
@@ -216,7 +224,7 @@ impl<const D: usize> Together<D> {
         strain: ZERO,
     };
 
-    /// `law(g)`: at the Gauss points.
+    /// Sets the cell of lane `k`; `law(g)` is its law at Gauss point `g`.
     fn set(&mut self, k: usize, cell: CellMeasure, u: &Nodal<D>, law: impl Fn(usize) -> PointLaw) {
         for a in 0..NODES {
             for c in 0..D {
@@ -230,6 +238,7 @@ impl<const D: usize> Together<D> {
         self.laws.iter_mut().enumerate().for_each(|(g, place)| place.set(k, &law(g)));
     }
 
+    /// Internal forces of the cell of lane `k`.
     fn internal(&self, k: usize) -> Internal<D> {
         let mut out =
             Internal { dissipation: self.dissipation[k], strain: self.strain[k], ..Internal::NONE };
@@ -243,7 +252,7 @@ impl<const D: usize> Together<D> {
 }
 
 dispatch! {
-    /// Forces and powers of cells.
+    /// Computes the forces and powers of the cells.
     fn stresses<const D: usize>(cells: &mut Together<D>) = stresses_kernel
 }
 
@@ -290,6 +299,7 @@ fn stresses_kernel<const LENGTH: usize, const FMA: bool, const D: usize>(cells: 
     }
 }
 
+/// A 3 x 3 table of one-dimensional values or slopes.
 type Rows = [[f64; 3]; 3];
 
 const fn transposed(t: &Rows) -> Rows {
@@ -297,7 +307,7 @@ const fn transposed(t: &Rows) -> Rows {
     [[a, d, g], [b, e, h], [c, f, i]]
 }
 
-/// Each row of three contracted: `out[3 j + i] = sum_a table[i][a] v[3 j + a]`.
+/// Contraction of each row: `out[3 j + i] = sum_a table[i][a] v[3 j + a]`.
 #[inline(always)]
 fn across<const FMA: bool>(table: &Rows, v: &[Lanes; 9]) -> [Lanes; 9] {
     let mut out = [ZERO; 9];
@@ -314,7 +324,7 @@ fn across<const FMA: bool>(table: &Rows, v: &[Lanes; 9]) -> [Lanes; 9] {
     out
 }
 
-/// Adds columns contracted: `out[3 j + i] += sum_b table[j][b] v[3 b + i]`.
+/// Adds the contraction of each column: `out[3 j + i] += sum_b table[j][b] v[3 b + i]`.
 #[inline(always)]
 fn add_rows<const FMA: bool>(out: &mut [Lanes; 9], table: &Rows, v: &[Lanes; 9]) {
     for j in 0..3 {
@@ -329,7 +339,8 @@ fn add_rows<const FMA: bool>(out: &mut [Lanes; 9], table: &Rows, v: &[Lanes; 9])
     }
 }
 
-/// Nodal values at the heights of the Gauss points, and their slopes there.
+/// Interpolates nodal values in the vertical direction: values and slopes at the rows of Gauss
+/// points.
 #[inline(always)]
 fn up<const FMA: bool>(v: &[Lanes; 9]) -> ([Lanes; 9], [Lanes; 9]) {
     let (mut values, mut slopes) = ([ZERO; 9], [ZERO; 9]);
@@ -338,7 +349,7 @@ fn up<const FMA: bool>(v: &[Lanes; 9]) -> ([Lanes; 9], [Lanes; 9]) {
     (values, slopes)
 }
 
-/// The transpose of [`up`].
+/// Transpose of [`up`].
 #[inline(always)]
 fn down<const FMA: bool>(values: &[Lanes; 9], slopes: &[Lanes; 9]) -> [Lanes; 9] {
     let mut out = [ZERO; 9];
@@ -347,8 +358,9 @@ fn down<const FMA: bool>(values: &[Lanes; 9], slopes: &[Lanes; 9]) -> [Lanes; 9]
     out
 }
 
-/// Adds the stiffness of a point of volume `volume` to the element matrix: only blocks of
-/// components on and below the diagonal; [`mirror`] completes them.
+/// Adds the stiffness of a point with the given volume to the element matrix, only in the blocks of
+/// components on and below the diagonal; [`mirror`](crate::solve::element::mirror) fills the
+/// others.
 pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &PointLaw, volume: f64) {
     for component in 0..D {
         for a in 0..NODES {
@@ -357,7 +369,7 @@ pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &Point
             if component == 2 {
                 g.w = s.n[a];
             }
-            // The stress of a unit value of this unknown; what it does to others is the row.
+            // The stress of a unit value of this unknown; its forces on all unknowns are the row.
             let t = Stress::<D>::new(law, &g.rates(), volume);
             let row = &mut k[NODES * component + a];
             for c in 0..=component {
@@ -374,7 +386,7 @@ pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &Point
     }
 }
 
-/// Adds the stiffness of a cut cell, on and below the diagonal of components.
+/// Adds the stiffness of a cut cell, in the blocks of components on and below the diagonal.
 pub fn add_cut_stiffness(k: &mut Matrix, cut: &CutStiffness) {
     for (i, row) in cut.matrix.iter().enumerate() {
         for j in 0..NODES * (i / NODES + 1) {
@@ -392,7 +404,7 @@ mod tests {
 
     const SIZE: [f64; 2] = [0.7, 1.3];
 
-    /// Nine points with different anisotropic laws that have every term.
+    /// Nine points with different anisotropic laws in which every coefficient is nonzero.
     fn points() -> [IntegrationPoint; 9] {
         std::array::from_fn(|g| {
             let t = g as f64;
@@ -421,7 +433,7 @@ mod tests {
         std::array::from_fn(|a| std::array::from_fn(|c| ((3 * a + 7 * c) as f64).sin()))
     }
 
-    /// Of one of some cells that are computed together.
+    /// Internal forces of one lane of the cells that are computed together.
     fn internal_at<const D: usize>(simd: Simd, lane: usize, u: &Nodal<D>) -> Internal<D> {
         let mut cells = Together::<D>::EMPTY;
         let points = points();
@@ -432,7 +444,7 @@ mod tests {
         cells.internal(lane)
     }
 
-    /// The loop over points that [`Together`] replaces.
+    /// Forces by a loop over points, the reference for [`Together`].
     fn force_point_by_point<const D: usize>(u: &Nodal<D>) -> Nodal<D> {
         let mut f = [[0.0; D]; NODES];
         for p in points() {

@@ -1,25 +1,25 @@
-//! The weight of the materials: `integral rho (g + a) . u~`, with gravity `g` and an acceleration
-//! `a(x, y)` that is fixed in space.
+//! This module computes the weight of the materials: `integral rho (g + a) . u~`, with gravity `g`
+//! and an acceleration `a(x, y)` that is fixed in space.
 //!
-//! Densities come from [`density`](crate::solve::density) or, where particles are the integration
-//! points, from them.
+//! Densities come from [`density`](crate::solve::density) or, if particles are the integration
+//! points, from the particles.
 
 use crate::plan::Plan;
 use crate::scene::Quadrature as Rule;
 use crate::solve::density::Density;
 use crate::solve::quadrature::Quadrature;
 
-/// Where the densities of a cell's integration points are known.
+/// Points at which the densities of a cell are known.
 #[derive(Clone, Copy)]
 pub enum Masses<'a> {
-    /// At the Gauss points.
+    /// The Gauss points, with fitted densities.
     Fitted(&'a Density),
-    /// At the integration points themselves.
+    /// The integration points, with their own densities.
     Points(&'a Quadrature),
 }
 
 impl<'a> Masses<'a> {
-    /// The masses that a method integrates.
+    /// The masses that a quadrature rule integrates.
     pub fn of(rule: Rule, density: &'a Density, quadrature: &'a Quadrature) -> Self {
         match rule {
             Rule::Mixture | Rule::Laminate => Masses::Fitted(density),
@@ -27,7 +27,8 @@ impl<'a> Masses<'a> {
         }
     }
 
-    /// Mass at each point as a share of the cell's volume, reference coordinates, shape functions.
+    /// Calls `f` for each point with its mass divided by the volume of the cell, its reference
+    /// coordinates and the shape functions.
     fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {
         match self {
             Masses::Fitted(density) => density.for_points(cell, f),
@@ -38,7 +39,7 @@ impl<'a> Masses<'a> {
     }
 }
 
-/// Adds the weight under gravity `g`, in the plan's units.
+/// Adds the weight under gravity `g`, in the plan's units, to the nodal load.
 pub fn add_gravity<const D: usize>(
     plan: &Plan,
     g: [f64; 2],
@@ -61,7 +62,7 @@ pub fn add_gravity<const D: usize>(
     }
 }
 
-/// Adds the weight under the plan's acceleration, if it has one.
+/// Adds the weight under the plan's acceleration, if there is one, to the nodal load.
 pub fn add_acceleration<const D: usize>(plan: &Plan, masses: Masses, load: &mut [[f64; D]]) {
     let Some(acceleration) = &plan.acceleration else { return };
     let (mesh, unit) = (&plan.mesh, plan.units.acceleration());

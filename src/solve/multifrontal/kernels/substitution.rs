@@ -1,7 +1,8 @@
-//! Kernels of the forward and backward substitution.
+//! This module contains the kernels of the forward and backward substitution.
 
 use super::*;
 
+/// Kernel of [`forward`].
 #[inline(always)]
 pub(super) fn forward_kernel<const R: usize, const FMA: bool>(
     l: Columns,
@@ -42,7 +43,7 @@ pub(super) fn forward_kernel<const R: usize, const FMA: bool>(
     }
 }
 
-/// Columns of a panel that are taken together.
+/// Number of columns of a panel that are processed together if `columns` remain.
 #[inline(always)]
 pub(super) fn part_of_panel(columns: usize) -> usize {
     match columns {
@@ -54,12 +55,13 @@ pub(super) fn part_of_panel(columns: usize) -> usize {
 }
 
 impl<'a> Columns<'a> {
+    /// The columns from column `j` on.
     #[inline(always)]
     fn after_columns(self, j: usize) -> Columns<'a> {
         Columns { data: &self.data[(j * self.ld).min(self.data.len())..], ld: self.ld }
     }
 
-    /// The first `rows` of each of the first columns.
+    /// The first `rows` entries of each of the first `W` columns.
     #[inline(always)]
     fn first<const W: usize>(self, rows: usize) -> [&'a [f64]; W] {
         std::array::from_fn(|k| &self.data[k * self.ld..k * self.ld + rows])
@@ -99,6 +101,7 @@ pub(super) fn subtract_columns<const W: usize, const FMA: bool>(
     }
 }
 
+/// Kernel of [`backward`].
 #[inline(always)]
 pub(super) fn backward_kernel<const R: usize, const FMA: bool>(
     l: Columns,
@@ -108,7 +111,7 @@ pub(super) fn backward_kernel<const R: usize, const FMA: bool>(
     let own = x.len();
     let mut k = own;
     while k > 0 {
-        // The narrow panel, if there is one, is the last.
+        // If there is a narrow panel, it is the last one.
         let width = if k.is_multiple_of(PANEL) { PANEL } else { k % PANEL };
         k -= width;
         let (done, ahead) = x[k..].split_at_mut(width);
