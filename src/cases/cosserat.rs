@@ -1,4 +1,4 @@
-//! Exact solutions of the Cosserat equations.
+//! This module holds cases with exact solutions of the Cosserat equations.
 
 use super::{Case, Exact, Rates};
 use crate::scene::SceneSource;
@@ -7,11 +7,11 @@ use std::f64::consts::PI;
 /// Viscosities and internal length of a Cosserat fluid.
 #[derive(Clone, Copy, Debug)]
 pub struct Fluid {
-    /// eta
+    /// Shear viscosity eta, Pa s.
     pub shear: f64,
-    /// eta_c
+    /// Coupling viscosity eta_c, Pa s.
     pub coupling: f64,
-    /// R
+    /// Internal length R, m.
     pub internal_length: f64,
 }
 
@@ -34,7 +34,7 @@ impl Fluid {
 const LAYER: &str = "schema = 1\nname = \"case\"\n[domain]\nx = [0, 0.25]\ny = [-0.5, 0.5]\n\
                      length_scale = 1\n[time]\nend = 1\n";
 
-/// Plane Couette flow between walls at y = +-1/2 without rotation, shear stress `tau`:
+/// Plane Couette flow with shear stress `tau` between walls at y = +-1/2 that prevent rotation:
 ///
 /// ```text
 /// w = -(tau/2 eta) (1 - cosh ky / cosh kh)
@@ -69,7 +69,8 @@ pub fn couette(fluid: Fluid, tau: f64) -> Case {
     }
 }
 
-/// Plane Poiseuille flow between walls at y = +-1/2 without slip or rotation, gradient `g`:
+/// Plane Poiseuille flow with the pressure gradient `g` (`G` below) between walls at y = +-1/2
+/// without slip or rotation:
 ///
 /// ```text
 /// w = (G/2 eta) (y - h sinh ky / sinh kh)
@@ -104,15 +105,15 @@ pub fn poiseuille(fluid: Fluid, g: f64) -> Case {
     }
 }
 
-/// Cells of a stream function `psi = sin kx x sin ky y` in the unit box, free slip and w = 0 on
-/// its walls, with `kx = m pi`, `ky = n pi`:
+/// Cellular flow in the unit box with the streamfunction `psi = sin kx x sin ky y`, free slip and
+/// w = 0 on the walls, `kx = m pi`, `ky = n pi`:
 ///
 /// ```text
 /// u = psi,y   v = -psi,x   w = beta K^2 psi / 2   beta = 2/(2 + R^2 K^2)   K^2 = kx^2 + ky^2
 /// f = K^2 [eta + eta_c R^2 K^2 / (2 + R^2 K^2)] (u, v) + grad p
 /// ```
-/// with a pressure `p = P cos kx x cos ky y` of the size of the viscous stress on top, so that
-/// its error has a scale.
+/// The added pressure `p = P cos kx x cos ky y` is of the size of the viscous stress, so that its
+/// relative error is defined.
 pub fn coupled_cell(fluid: Fluid, m: u32, n: u32) -> Case {
     let (kx, ky) = (f64::from(m) * PI, f64::from(n) * PI);
     let k2 = kx * kx + ky * ky;

@@ -1,7 +1,8 @@
-//! Two layers whose interface crosses the cells at an angle, in uniform stress.
+//! This module holds cases of two layers in uniform stress, whose interface is inclined to the
+//! mesh.
 //!
-//! The interface goes through the middle of the unit box, at `angle` to the x axis; with the
-//! unit vectors `t` along and `n` across it and `d` the distance from it:
+//! The interface passes through the centre of the unit box at an angle to the x axis. With unit
+//! vectors `t` along and `n` across it, and the distance `d` from it:
 //!
 //! ```text
 //! simple shear   u = t d/eta_k,   shear stress 1 everywhere,   p = 0
@@ -11,11 +12,12 @@
 use super::{Case, Exact, Rates};
 use crate::scene::SceneSource;
 
-/// Parameters of the cases.
+/// Parameters of the inclined cases.
 #[derive(Clone, Copy, Debug)]
 pub struct Inclined {
+    /// Angle of the interface to the x axis, degrees.
     pub degrees: f64,
-    /// Viscosity of the upper layer over that of the lower one.
+    /// Viscosity of the upper layer over the viscosity of the lower layer.
     pub contrast: f64,
 }
 
@@ -33,8 +35,8 @@ impl Inclined {
     }
 }
 
-/// Simple shear along the interface. The upper side has the exact traction, the others the exact
-/// velocity.
+/// Simple shear along the interface. The exact traction is prescribed on the upper side, and the
+/// exact velocity on the other sides.
 pub fn inclined_shear(i: Inclined) -> Case {
     let (s, c) = i.degrees.to_radians().sin_cos();
     let soft = format!("({c:?}*y - {s:?}*x)");
@@ -67,7 +69,7 @@ pub fn inclined_shear(i: Inclined) -> Case {
     }
 }
 
-/// Stretching along the interface: the velocity is linear, the pressure jumps.
+/// Stretching along the interface. The velocity is linear, and the pressure jumps at the interface.
 pub fn inclined_pure_shear(i: Inclined) -> Case {
     let (s, c) = i.degrees.to_radians().sin_cos();
     // D = t t' - n n'

@@ -1,31 +1,36 @@
-//! A stirred box of layered fluid, and the resolved stack of layers whose limit it is (sections
-//! 2.3-2.4 of Dufour, Muehlhaus and Moresi).
+//! This module holds the case of a layered fluid driven by a body force in a box, and the case of a
+//! resolved stack of layers, whose limit it is (sections 2.3-2.4 of Dufour, Muehlhaus and Moresi).
 //!
-//! Unit box, free slip, layers along x, stream function `psi = (A/ky) sin kx x sin ky y`, force
+//! The unit box has free slip and layers along x. With the streamfunction
+//! `psi = (A/ky) sin kx x sin ky y` and the force
 //! `F (ky sin kx x cos ky y, -kx cos kx x sin ky y)/ky`:
 //!
 //! ```text
 //! A = F (kx^2 + ky^2) / (4 eta kx^2 ky^2 + eta_s (kx^2 - ky^2)^2)
 //! ```
-//! with `eta` and `eta_s` the arithmetic and the harmonic mean of the stack's viscosities.
+//! where `eta` and `eta_s` are the arithmetic and the harmonic mean of the viscosities of the
+//! stack.
 
 use super::{Case, Exact, Rates};
 use crate::scene::{SceneError, SceneSource, presets};
 use std::f64::consts::PI;
 
-/// Half waves of the flow in x and y; they must differ, or the layers are not sheared.
+/// Numbers of half waves of the flow in x and y. If they are equal, the layers are not sheared.
 #[derive(Clone, Copy, Debug)]
 pub struct Wave {
+    /// Half waves along x.
     pub x: u32,
+    /// Half waves along y.
     pub y: u32,
 }
 
 impl Wave {
+    /// Wave numbers `kx`, `ky`.
     fn numbers(self) -> [f64; 2] {
         [f64::from(self.x) * PI, f64::from(self.y) * PI]
     }
 
-    /// The force along x and y with `F = ky`.
+    /// Expressions of the force along x and y, with `F = ky`.
     fn force(self) -> [String; 2] {
         let [kx, ky] = self.numbers();
         [
@@ -34,7 +39,7 @@ impl Wave {
         ]
     }
 
-    /// The exact flow of the layered law.
+    /// The exact solution of the layered law.
     fn exact(self, contrast: f64) -> Exact {
         let [kx, ky] = self.numbers();
         let (eta, eta_s) = (0.5 * (1.0 + contrast), 2.0 / (1.0 + 1.0 / contrast));
@@ -52,7 +57,11 @@ impl Wave {
     }
 }
 
-/// The stack with `pairs` pairs of layers. Its error against the layered law is that of the law.
+/// The stack with `pairs` pairs of layers, whose viscosities differ by the factor `contrast`. Its
+/// difference from the exact solution is the error of the layered law.
+///
+/// # Errors
+/// The preset does not accept the parameters.
 pub fn layer_stack(wave: Wave, pairs: u32, contrast: f64) -> Result<Case, SceneError> {
     let [x, y] = wave.force();
     let sets = [
@@ -71,7 +80,7 @@ pub fn layer_stack(wave: Wave, pairs: u32, contrast: f64) -> Result<Case, SceneE
     })
 }
 
-/// The same box filled with one layered fluid.
+/// The same box filled with one layered fluid; `contrast` as for [`layer_stack`].
 pub fn layered_cell(wave: Wave, contrast: f64) -> Case {
     let [x, y] = wave.force();
     let text = format!(

@@ -1,4 +1,4 @@
-//! The harness: solves a case and measures its errors.
+//! This module solves a case and measures its errors.
 
 use super::{Case, Exact};
 use crate::plan::{Plan, resolve};
@@ -9,35 +9,49 @@ use crate::space::shape::GAUSS_5;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Relative errors in the L2 norm (absolute where the exact field vanishes).
+/// Relative errors in the L2 norm (absolute if the exact field is zero).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Errors {
+    /// Error of the velocity.
     pub velocity: f64,
+    /// Error of the rotation.
     pub rotation: f64,
+    /// Error of the pressure.
     pub pressure: f64,
 }
 
 /// Why a case could not be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The simulation failed.
     #[error(transparent)]
     Sim(#[from] SimError),
 }
 
-/// The plan of a scene, errors pointing into its text.
+/// The plan of a scene.
+///
+/// # Errors
+/// The scene is invalid; the error refers to its text.
 pub fn plan_of(source: &SceneSource) -> Result<Plan, CaseError> {
     Ok(resolve(&parse(source)?).map_err(|e| e.with_source(source))?)
 }
 
-/// A run of a scene at its first instant.
+/// Starts a run of a scene and solves for its initial flow.
+///
+/// # Errors
+/// The scene is invalid, or the initial flow cannot be solved for.
 pub fn start(source: &SceneSource) -> Result<Box<dyn Run>, CaseError> {
     Ok(sim::start(Arc::new(plan_of(source)?))?)
 }
 
 impl Case {
-    /// The plan at a resolution, with further sets.
+    /// The plan with `cells` as `accuracy.cells` and further assignments `sets` (`name=value`).
+    ///
+    /// # Errors
+    /// The scene is invalid.
     pub fn plan(&self, cells: u32, sets: &[&str]) -> Result<Plan, CaseError> {
         let mut all = vec![format!("accuracy.cells={cells}")];
         all.extend(sets.iter().map(|s| s.to_string()));
@@ -45,17 +59,26 @@ impl Case {
         plan_of(&source)
     }
 
-    /// Solves the first instant at a resolution.
+    /// Solves for the initial flow; for the arguments see [`Case::plan`].
+    ///
+    /// # Errors
+    /// The scene is invalid, or the initial flow cannot be solved for.
     pub fn solve(&self, cells: u32, sets: &[&str]) -> Result<Box<dyn Run>, CaseError> {
         Ok(sim::start(Arc::new(self.plan(cells, sets)?))?)
     }
 
-    /// Errors of the first instant.
+    /// Errors of the initial flow; for the arguments see [`Case::plan`].
+    ///
+    /// # Errors
+    /// The scene is invalid, or the initial flow cannot be solved for.
     pub fn errors(&self, cells: u32, sets: &[&str]) -> Result<Errors, CaseError> {
         Ok(Errors::of(self.solve(cells, sets)?.as_ref(), &self.exact))
     }
 
-    /// Errors at the end of the run.
+    /// Errors at the end of the run; for the arguments see [`Case::plan`].
+    ///
+    /// # Errors
+    /// The scene is invalid, or a step failed.
     pub fn errors_at_end(&self, cells: u32, sets: &[&str]) -> Result<Errors, CaseError> {
         let mut run = self.solve(cells, sets)?;
         while !run.is_finished() {
@@ -65,11 +88,13 @@ impl Case {
     }
 }
 
-/// Fields of an instant at SI points.
+/// A computed flow that can be evaluated at SI points.
 pub trait Fields {
+    /// The plan of the flow.
     fn plan(&self) -> &Plan;
-    /// Velocity and rotation.
+    /// Velocity and rotation (m/s, m/s, 1/s) at an SI point.
     fn velocity_at(&self, p: [f64; 2]) -> [f64; 3];
+    /// Pressure, Pa, at an SI point.
     fn pressure_at(&self, p: [f64; 2]) -> f64;
 }
 
@@ -85,9 +110,11 @@ impl Fields for dyn Run {
     }
 }
 
-/// A flow that was solved for a plan without a run.
+/// A flow that was computed from a plan without a run.
 pub(super) struct Solved<'a, const D: usize> {
+    /// The plan.
     pub plan: &'a Plan,
+    /// The flow, in the plan's units.
     pub flow: Flow<D>,
 }
 
@@ -104,12 +131,12 @@ impl<const D: usize> Fields for Solved<'_, D> {
 }
 
 impl Errors {
-    /// Errors of the current instant, by 5 x 5 Gauss points in each cell. Where the pressure is
-    /// determined up to a constant its mean does not count.
+    /// Errors of the current flow, integrated with 5 x 5 Gauss points per cell. If the pressure is
+    /// determined only up to a constant, its mean is ignored.
     pub fn of<F: Fields + ?Sized>(run: &F, exact: &Exact) -> Errors {
         let plan = run.plan();
         let mesh = &plan.mesh;
-        // Sums of squares: error and exact, of velocity, rotation, pressure.
+        // Sums of squares of the error and the exact value, for velocity, rotation, pressure.
         let mut sums = [[0.0; 2]; 3];
         // Sums of weight, pressure error, exact pressure.
         let mut means = [0.0; 3];

@@ -1,5 +1,5 @@
-//! Cases with exact solutions: a scene, its exact fields and the rates expected of it, in one
-//! place, measured by one harness that the tests and the commands share.
+//! This module holds cases with exact solutions. A case combines a scene, its exact fields and the
+//! expected orders of convergence. Tests and commands measure all cases with the same functions.
 
 mod cosserat;
 mod inclined;
@@ -27,31 +27,37 @@ pub use vortex::{steady_vortex, steady_vortex_without_particles};
 
 use crate::scene::SceneSource;
 
-/// An exact solution at an SI point.
+/// An exact solution, as functions of a point in SI units.
 pub struct Exact {
-    /// `u, v, w`
+    /// Velocity and rotation `u, v, w` (m/s, m/s, 1/s).
     pub velocity: Box<dyn Fn(f64, f64) -> [f64; 3] + Send + Sync>,
-    /// Up to a constant where the domain is closed.
+    /// Pressure, Pa; up to a constant if the domain is closed.
     pub pressure: Box<dyn Fn(f64, f64) -> f64 + Send + Sync>,
 }
 
-/// Orders of convergence that are expected.
+/// Smallest expected orders of convergence.
 #[derive(Clone, Copy, Debug)]
 pub struct Rates {
+    /// Order of the velocity error.
     pub velocity: f64,
+    /// Order of the rotation error; `None` if it is not tested.
     pub rotation: Option<f64>,
+    /// Order of the pressure error; `None` if it is not tested.
     pub pressure: Option<f64>,
 }
 
-/// A scene whose flow at an instant is known exactly.
+/// A scene whose initial flow is known exactly.
 pub struct Case {
+    /// Name of the case.
     pub name: String,
-    /// What flows, in a few words.
+    /// Short description of the flow.
     pub title: &'static str,
-    /// Where the solution comes from.
+    /// Source of the exact solution.
     pub source: &'static str,
-    /// `accuracy.cells` is overwritten.
+    /// The scene; its `accuracy.cells` is overwritten.
     pub scene: SceneSource,
+    /// The exact solution.
     pub exact: Exact,
+    /// Expected orders of convergence.
     pub rates: Rates,
 }

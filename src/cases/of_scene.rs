@@ -1,11 +1,11 @@
-//! Exact solutions of presets, found by what a scene says.
+//! This module finds the exact solution of a scene that is a preset with known solution.
 
 use super::{Case, Drive};
 use super::{Exact, Fluid, SolCx, couette, poiseuille, solcx, solvi};
 use crate::scene::{Scene, Scope, parse, presets, to_toml};
 
-/// What is left of a scene if its numerics, its pictures and the values of its parameters are not
-/// looked at: two scenes that agree in it pose the same problem.
+/// The scene as TOML without its numerics, its output and the values of its parameters. Two scenes
+/// with equal text pose the same problem.
 fn problem(scene: &Scene, preset: &Scene) -> String {
     let mut s = scene.clone();
     s.accuracy = preset.accuracy.clone();
@@ -19,8 +19,8 @@ fn problem(scene: &Scene, preset: &Scene) -> String {
     to_toml(&s)
 }
 
-/// The exact solution of a scene that is a preset with one, whatever its parameters and its
-/// numerics. Of `solcx` and `solvi` it holds at the start only.
+/// The exact solution of a scene if it is a preset with known solution, for any parameters and
+/// numerics. The solutions of `solcx` and `solvi` hold only at the start.
 pub fn exact_of(scene: &Scene) -> Option<Exact> {
     let source = presets::find(&scene.name).ok()?;
     let preset = parse(&source).ok()?;
@@ -35,7 +35,7 @@ pub fn exact_of(scene: &Scene) -> Option<Exact> {
             coupling: get("coupling")?,
             internal_length: get("internal_length")?,
         };
-        // Without either nothing is Cosserat, and the formulas divide by zero.
+        // If either is zero, the fluid is not a Cosserat fluid, and the formulas divide by zero.
         (fluid.coupling > 0.0 && fluid.internal_length > 0.0).then_some(fluid)
     };
     let case: Case = match scene.name.as_str() {

@@ -1,34 +1,37 @@
-//! Linear theory of the Rayleigh-Taylor instability of two viscous layers.
+//! This module compares growth rates with the linear theory of the Rayleigh-Taylor instability of
+//! two viscous layers.
 
 use super::{CaseError, start};
 use crate::scene::SceneSource;
 use std::f64::consts::PI;
 
-/// Two layers between plates without slip, free slip (or symmetry) at the sides. SI units.
+/// Two layers between no-slip plates, with free slip (or symmetry) at the sides, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layers {
+    /// The upper layer.
     pub upper: Layer,
+    /// The lower layer.
     pub lower: Layer,
-    /// m
+    /// Wavelength of the undulation, m.
     pub wavelength: f64,
-    /// m/s2, downwards
+    /// Downward gravity, m/s2.
     pub gravity: f64,
 }
 
-/// One of them.
+/// A viscous layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layer {
-    /// m
+    /// Thickness, m.
     pub thickness: f64,
-    /// Pa s
+    /// Shear viscosity, Pa s.
     pub viscosity: f64,
-    /// kg/m3
+    /// Density, kg/m3.
     pub density: f64,
 }
 
 /// Growth rate, 1/s, of a small undulation of the interface, by Ramberg (1968, Phys. Earth Planet.
 /// Inter. 1, 63-67), in the form of Gerya (2010, Introduction to Numerical Geodynamic Modelling,
-/// section 16.2): negative where the denser layer lies below.
+/// section 16.2). It is negative if the denser layer is below.
 ///
 /// ```text
 /// rate = K (rho_1 - rho_2) g h_2 / (2 eta_2),   K = -d12 / (c11 j22 - d12 i21),
@@ -38,9 +41,9 @@ pub struct Layer {
 /// i21 = r phi_2 (sinh 2 phi_1 + 2 phi_1)/q_1 + phi_2 (sinh 2 phi_2 + 2 phi_2)/q_2
 /// j22 = 2 r phi_1^2 phi_2/q_1 - 2 phi_2^3/q_2
 /// ```
-/// with 1 above and 2 below. It agrees to rounding with the solution of the fourth-order equation
-/// of each layer's vertical velocity, matched at the interface (velocity, shear stress, and a
-/// normal stress that jumps by the weight of the undulation).
+/// where 1 is the upper and 2 the lower layer. The rate agrees to rounding with the solution of the
+/// fourth-order equations of the vertical velocities of the layers, matched at the interface
+/// (velocity, shear stress, and a normal stress that jumps by the weight of the undulation).
 ///
 /// ```
 /// use grainscope::cases::rayleigh_taylor::{Layer, Layers, ramberg_growth_rate};
@@ -58,7 +61,7 @@ pub fn ramberg_growth_rate(layers: &Layers) -> f64 {
     let Layers { upper, lower, wavelength, gravity } = layers;
     let r = upper.viscosity / lower.viscosity;
     let phi = [upper, lower].map(|l| 2.0 * PI * l.thickness / wavelength);
-    // All over cosh 2 phi, which overflows for thick layers.
+    // Hyperbolic functions are divided by exp(2 phi) because they overflow for thick layers.
     let scaled = phi.map(|p| {
         let (decay, c) = ((-2.0 * p).exp(), 0.5 * (1.0 + (-4.0 * p).exp()));
         let (s, one) = (0.5 * (1.0 - (-4.0 * p).exp()), decay);
@@ -79,17 +82,23 @@ pub fn ramberg_growth_rate(layers: &Layers) -> f64 {
     k * (upper.density - lower.density) * gravity * lower.thickness / (2.0 * lower.viscosity)
 }
 
-/// A light layer of thickness 0.2 below a heavy one in a box of height 1, in units of the heavy
-/// fluid.
+/// A light layer of thickness 0.2 below a heavy layer in a box of height 1. The heavy fluid has
+/// density and viscosity 1, and gravity is 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Undulation {
+    /// Wavelength of the undulation.
     pub wavelength: f64,
-    /// Viscosity of the light layer over that of the heavy one.
+    /// Viscosity of the light layer over the viscosity of the heavy layer.
     pub viscosity: f64,
+    /// Amplitude of the undulation.
     pub amplitude: f64,
 }
 
-/// Computed growth rate of the interface's first Fourier mode over that of linear theory.
+/// Computed growth rate of the first Fourier mode of the interface over the rate of linear theory.
+/// `sets`: further assignments `name=value`.
+///
+/// # Errors
+/// The scene is invalid, or the initial flow cannot be solved for.
 pub fn growth_ratio(u: Undulation, cells: u32, sets: &[&str]) -> Result<f64, CaseError> {
     const THICKNESS: f64 = 0.2;
     let Undulation { wavelength, viscosity, amplitude } = u;
@@ -140,7 +149,7 @@ mod tests {
 
     #[test]
     fn known_rates_are_met() {
-        // From a matching of the layers' equations, solved independently.
+        // From an independent solution of the matched equations of the layers.
         for (lower, viscosities, wavelength, expected) in [
             (0.2, [1.0, 1.0], 1.8284, 0.0109401891382),
             (0.2, [1.0, 0.1], 1.8284, 0.0470548392182),
@@ -154,7 +163,7 @@ mod tests {
 
     #[test]
     fn short_waves_see_no_walls() {
-        // delta rho g / (2 k (eta_1 + eta_2)): two half-spaces.
+        // Rate of two half-spaces: delta rho g / (2 k (eta_1 + eta_2)).
         let k = 2.0 * PI / 0.02;
         let expected = 1.0 / (2.0 * k * (1.0 + 3.0));
         assert!((rate(0.5, [1.0, 3.0], 0.02) / expected - 1.0).abs() < 1e-9);

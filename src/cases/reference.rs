@@ -1,4 +1,5 @@
-//! The same scene without particles: the plan's own fields at the Gauss points.
+//! This module solves a case without particles: the fields of the plan are evaluated at Gauss
+//! points.
 
 use super::Case;
 use super::measure::{CaseError, Errors, Solved};
@@ -15,9 +16,12 @@ use crate::solve::terms::weight::{Masses, add_acceleration, add_gravity};
 use crate::space::flow::Flow;
 
 impl Case {
-    /// Errors of the first instant when materials and densities are integrated by Gauss points
-    /// that know the scene's fields, instead of by particles: what the elements alone can do. Only
-    /// for incompressible scenes.
+    /// Errors of the initial flow if materials and densities are integrated with the exact fields
+    /// at Gauss points instead of particles. This is the discretisation error of the elements
+    /// alone. Only for incompressible scenes.
+    ///
+    /// # Errors
+    /// The scene is invalid, or the flow cannot be solved for.
     pub fn errors_without_particles(&self, cells: u32) -> Result<Errors, CaseError> {
         let plan = self.plan(cells, &[])?;
         if plan.effects.rotation {
@@ -28,14 +32,14 @@ impl Case {
     }
 }
 
-/// The material at a point of the plan.
+/// Index of the material at an SI point, and the initial director of its region.
 fn material_at(plan: &Plan, si: [f64; 2]) -> Option<(usize, Option<&InitialDirector>)> {
     let region = plan.regions.iter().rev().find(|r| r.shape.contains(si));
     let index = region.map(|r| r.material).or(plan.background())?;
     Some((index as usize, region.and_then(|r| r.director.as_ref())))
 }
 
-/// Viscosity, density of a material at a point, in the plan's units.
+/// Viscosity and density of a material at an SI point, in the plan's units.
 fn values(plan: &Plan, index: usize, material: &Material, [x, y]: [f64; 2]) -> (f64, f64) {
     let fields = &plan.initial[index];
     let eta = fields.viscosity.as_ref().map(|f| f.at(x, y) / plan.units.viscosity);
@@ -43,6 +47,7 @@ fn values(plan: &Plan, index: usize, material: &Material, [x, y]: [f64; 2]) -> (
     (eta.unwrap_or(material.viscosity), density.unwrap_or(material.density))
 }
 
+/// Solves for the initial flow of a plan without particles.
 fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
     let mesh = &plan.mesh;
     let materials = &plan.state.materials;

@@ -1,30 +1,32 @@
-//! Inclusions smaller than a cell, in pure shear at the rate 1: what they add to the dissipation.
+//! This module measures the contribution of inclusions smaller than a cell to the dissipation, in
+//! pure shear at the rate 1.
 //!
-//! With viscosity `eta` around and `lambda eta` inside, strain rate `D:D = 2`:
+//! With viscosity `eta` outside and `lambda eta` inside, and the strain rate `D:D = 2`:
 //!
 //! ```text
 //! sheet of area A stretched along itself   P = 4 eta (1 - A) + 4 lambda eta A      (exact)
 //! drop of area A << 1                      P = 4 eta [1 + 2 A (lambda - 1)/(lambda + 1)]
 //! ```
-//! The second is the dilute limit of a disc in two dimensions.
+//! The formula of the drop is the dilute limit for a disc in two dimensions.
 
 use super::{CaseError, start};
 use crate::scene::SceneSource;
 
-/// A scene whose excess of dissipation over the pure matrix is known.
+/// A scene with a small inclusion whose contribution to the dissipation is known.
 pub struct Small {
     scene: SceneSource,
-    /// Dissipation without the inclusion, and what it adds, for `eta = 1`.
+    /// Dissipation without the inclusion, for `eta = 1`.
     matrix: f64,
+    /// Dissipation added by the inclusion, for `eta = 1`.
     excess: f64,
 }
 
 impl Small {
-    /// A sheet through the middle of a unit box at an angle to the x axis.
+    /// A sheet near the centre of a unit box, at an angle to the x axis.
     pub fn sheet(degrees: f64, thickness: f64, contrast: f64) -> Self {
         let (s, c) = degrees.to_radians().sin_cos();
         let area = thickness / c;
-        // Off the middle by an odd share of a cell, so that no mesh line is met.
+        // Shifted from the centre so that it does not coincide with a mesh line.
         let shape = format!("abs({c:?}*y - {s:?}*x - 0.0137) < {:?}", 0.5 * thickness);
         Small {
             scene: scene(&shape, [c * c - s * s, 2.0 * s * c], contrast),
@@ -33,7 +35,7 @@ impl Small {
         }
     }
 
-    /// A drop near the middle of a unit box.
+    /// A drop near the centre of a unit box.
     pub fn drop(radius: f64, contrast: f64) -> Self {
         let shape = format!("(x - 0.0137)^2 + (y + 0.0091)^2 < {:?}", radius * radius);
         let area = std::f64::consts::PI * radius * radius;
@@ -44,7 +46,11 @@ impl Small {
         }
     }
 
-    /// Share of the true excess of dissipation that is computed.
+    /// Computed contribution of the inclusion to the dissipation over the exact one. `sets`:
+    /// further assignments `name=value`.
+    ///
+    /// # Errors
+    /// The scene is invalid, or the flow cannot be solved for.
     pub fn strength(&self, cells: u32, sets: &[&str]) -> Result<f64, CaseError> {
         let mut all = vec![format!("accuracy.cells={cells}")];
         all.extend(sets.iter().map(ToString::to_string));
@@ -54,7 +60,7 @@ impl Small {
     }
 }
 
-/// Unit box whose sides move as pure shear with `D = [[a, b], [b, -a]]`.
+/// Scene of a unit box with the velocity of pure shear, `D = [[a, b], [b, -a]]`, on its sides.
 fn scene(shape: &str, [a, b]: [f64; 2], contrast: f64) -> SceneSource {
     let side =
         format!("{{ velocity_x = \"{a:?}*x + {b:?}*y\", velocity_y = \"{b:?}*x - {a:?}*y\" }}");

@@ -1,8 +1,9 @@
-//! SolCx: a sharp jump of viscosity along a mesh direction (Zhong 1996; Duretz, May, Gerya and
-//! Tackley 2011).
+//! This module holds the case SolCx: a jump of the viscosity along a mesh direction (Zhong 1996;
+//! Duretz, May, Gerya and Tackley 2011).
 //!
-//! Unit box, free slip, force `f_y = sin(m y) cos(k x)`, `m = k = pi`, viscosity `eta_1` left of
-//! the jump and `eta_2` right of it. With `u = U(x) cos(m y)`, `v = -U'(x)/m sin(m y)`,
+//! The unit box has free slip and the force `f_y = sin(m y) cos(k x)`, `m = k = pi`. The viscosity
+//! is `eta_1` left of the jump and `eta_2` right of it.
+//! With `u = U(x) cos(m y)`, `v = -U'(x)/m sin(m y)`,
 //! `p = P(x) cos(m y)` each side has
 //!
 //! ```text
@@ -22,12 +23,12 @@ use std::sync::Arc;
 const M: f64 = PI;
 const K: f64 = PI;
 
-/// Parameters of the case.
+/// Parameters of SolCx.
 #[derive(Clone, Copy, Debug)]
 pub struct SolCx {
-    /// Viscosity of the right part over that of the left one.
+    /// Viscosity of the right part over the viscosity of the left part.
     pub contrast: f64,
-    /// Where the viscosity jumps.
+    /// Position of the jump along x.
     pub jump: f64,
 }
 
@@ -55,10 +56,11 @@ fn particular(x: f64, eta: f64) -> [f64; 4] {
     [a * s, a * K * c, -a * K * K * s, -a * K.powi(3) * c]
 }
 
-/// `U` and three derivatives on both sides.
+/// The solution `U` on both sides of the jump.
 struct Solution {
     jump: f64,
     viscosity: [f64; 2],
+    /// Constants `a, b, c, d` of each side.
     constants: [[f64; 4]; 2],
 }
 
@@ -67,11 +69,12 @@ impl Solution {
         let viscosity = [1.0, c.contrast];
         let mut a = SMatrix::<f64, 8, 8>::zeros();
         let mut b = SVector::<f64, 8>::zeros();
-        // Scale the second side's unknowns by its viscosity: all rows are then of one size.
+        // The unknowns of the second side are scaled by its viscosity, so that the rows of the
+        // matrix are of similar size.
         let scale = [1.0, 1.0 / c.contrast.max(1.0)];
         let mut row = 0;
         let mut demand = |terms: &[(usize, f64, [f64; 4])]| {
-            // Each term: side, place, weights of U, U', U'', U'''.
+            // Each term: side, position, weights of U, U', U'', U'''.
             for &(side, x, weight) in terms {
                 let h = homogeneous(x);
                 let p = particular(x, viscosity[side]);
@@ -99,7 +102,7 @@ impl Solution {
             (0, x, [0.0, 3.0 * e0, 0.0, -e0 / (M * M)]),
             (1, x, [0.0, -3.0 * e1, 0.0, e1 / (M * M)]),
         ]);
-        // Regular for every contrast and jump inside the box.
+        // The matrix is regular for every contrast and every jump inside the box.
         let s = a.full_piv_lu().solve(&b).unwrap_or_else(SVector::zeros);
         let constants = [0, 1].map(|side| std::array::from_fn(|k| s[4 * side + k] * scale[side]));
         Solution { jump: c.jump, viscosity, constants }
@@ -109,6 +112,7 @@ impl Solution {
         usize::from(x > self.jump)
     }
 
+    /// `U` and its first three derivatives.
     fn derivatives(&self, x: f64) -> [f64; 4] {
         let side = self.side(x);
         let (h, p) = (homogeneous(x), particular(x, self.viscosity[side]));
@@ -129,15 +133,17 @@ impl Solution {
     }
 }
 
-/// What drives the flow: a fixed body force, or the weight of a density that particles carry.
+/// The driving force of a flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drive {
+    /// A body force fixed in space.
     BodyForce,
+    /// The weight of a density that particles carry.
     Density,
 }
 
 impl Drive {
-    /// Sets that turn the body force of a scene along y into a density of `materials`.
+    /// Assignments that replace the body force of a scene along y by a density of `materials`.
     pub(super) fn sets(self, force: &str, materials: &[&str]) -> Vec<String> {
         if self == Drive::BodyForce {
             return vec![];
@@ -147,7 +153,10 @@ impl Drive {
     }
 }
 
-/// The case.
+/// The case SolCx.
+///
+/// # Errors
+/// The preset does not accept the parameters.
 pub fn solcx(c: SolCx, drive: Drive) -> Result<Case, SceneError> {
     let mut sets = drive.sets("sin(pi*y) * cos(pi*x)", &["left", "right"]);
     sets.extend([format!("contrast={:e}", c.contrast), format!("jump={}", c.jump)]);

@@ -1,6 +1,7 @@
-//! SolKz: a viscosity that grows exponentially (Revenaugh and Parsons 1987; Duretz et al. 2011).
+//! This module holds the case SolKz: a viscosity that grows exponentially (Revenaugh and Parsons
+//! 1987; Duretz et al. 2011).
 //!
-//! Unit box, free slip, viscosity `exp(2 B y)`, force `f_y = sin(m y) cos(k x)`. With
+//! The unit box has free slip, viscosity `exp(2 B y)` and force `f_y = sin(m y) cos(k x)`. With
 //! `v = V(y) cos kx`, `u = -V'/k sin kx`, `p = P(y) cos kx`:
 //!
 //! ```text
@@ -22,11 +23,14 @@ type C = Complex<f64>;
 
 const K: f64 = PI;
 
+/// The solution `V`.
 struct Solution {
     b: f64,
+    /// Roots of the characteristic polynomial.
     roots: [C; 4],
+    /// Constants of the homogeneous solutions.
     constants: [C; 4],
-    /// Exponent of the particular solution, and its factor: `Im(factor e^(exponent y))`.
+    /// Exponent and factor of the particular solution `Im(factor e^(exponent y))`.
     particular: (C, C),
 }
 
@@ -51,18 +55,20 @@ impl Solution {
             }
             rhs[row] = -C::from(solution.particular(y, order));
         }
-        // Regular: the four exponents differ for every b other than zero.
+        // The matrix is regular because the four exponents differ for every nonzero b.
         let c = a.full_piv_lu().solve(&rhs).unwrap_or_else(SVector::zeros);
         solution.constants = std::array::from_fn(|k| c[k]);
         solution
     }
 
-    /// Growing solutions are scaled to be 1 at the upper wall, decaying ones at the lower.
+    /// Homogeneous solution `k`; growing ones are scaled to 1 at the upper wall, decaying ones at
+    /// the lower wall.
     fn homogeneous(&self, k: usize, y: f64) -> C {
         let r = self.roots[k];
         if r.re > 0.0 { (r * (y - 1.0)).exp() } else { (r * y).exp() }
     }
 
+    /// Derivative of the particular solution.
     fn particular(&self, y: f64, order: i32) -> f64 {
         let (exponent, factor) = self.particular;
         (factor * exponent.powi(order) * (exponent * y).exp()).im
@@ -91,8 +97,11 @@ impl Solution {
     }
 }
 
-/// The case for a viscosity that grows by `contrast` from bottom to top and a force
-/// `sin(n pi y) cos(pi x)`.
+/// The case SolKz for a viscosity that grows by the factor `contrast` from bottom to top, and the
+/// force `sin(n pi y) cos(pi x)`.
+///
+/// # Errors
+/// The scene does not accept the parameters.
 pub fn solkz(contrast: f64, n: u32, drive: Drive) -> Result<Case, SceneError> {
     let b = 0.5 * contrast.ln();
     let force = format!("sin({n}*pi*y) * cos(pi*x)");

@@ -1,8 +1,8 @@
-//! SolVi: a round inclusion in pure shear (Schmid and Podladchikov 2003; Deubelbeiss and Kaus
-//! 2008).
+//! This module holds the case SolVi: a circular inclusion in pure shear (Schmid and Podladchikov
+//! 2003; Deubelbeiss and Kaus 2008).
 //!
-//! With `z = x + iy`, viscosity `eta` outside and `eta_i` inside a disc of radius `r`, strain rate
-//! 1 far away:
+//! With `z = x + iy`, viscosity `eta` outside and `eta_i` inside a disc of radius `r`, and strain
+//! rate 1 far away:
 //!
 //! ```text
 //! inside    u + iv = 2 eta/(eta + eta_i) conj z,   p = 0
@@ -13,7 +13,11 @@
 use super::{Case, Exact, Rates};
 use crate::scene::{SceneError, presets};
 
-/// The case for a viscosity `contrast` inside over that outside, radius 0.2 in a unit box.
+/// The case SolVi for an inclusion of radius 0.2 in a unit box; `contrast`: inner over outer
+/// viscosity.
+///
+/// # Errors
+/// The preset does not accept the parameters.
 pub fn solvi(contrast: f64) -> Result<Case, SceneError> {
     const RADIUS: f64 = 0.2;
     let r2 = RADIUS * RADIUS;

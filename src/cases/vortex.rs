@@ -1,17 +1,18 @@
-//! A steady vortex driven by a density that particles carry around with it: "rigid shear" of
-//! Gassmoeller, Lokavarapu, Bangerth and Puckett (2019).
+//! This module holds the case of a steady vortex driven by a density that particles carry: "rigid
+//! shear" of Gassmoeller, Lokavarapu, Bangerth and Puckett (2019).
 //!
 //! ```text
 //! u = (sin pi x cos pi y, -cos pi x sin pi y),   p = 2 pi cos pi x cos pi y,   eta = 1
 //! density = sin pi x sin pi y,   acceleration along y = -4 pi^2 cos(pi x) / sin(pi x)
 //! ```
-//! The density is constant along streamlines, so nothing should change, while the particles that
-//! carry it go around.
+//! The density is constant along streamlines, so the exact flow is steady although the particles
+//! move.
 
 use super::{Case, Exact, Rates};
 use crate::scene::SceneSource;
 use std::f64::consts::PI;
 
+/// The case with lines of a material and of a load.
 fn case(name: &str, material: &str, load: &str, rates: Rates) -> Case {
     let text = format!(
         "schema = 1\nname = \"{name}\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\n\
@@ -34,7 +35,7 @@ fn case(name: &str, material: &str, load: &str, rates: Rates) -> Case {
     }
 }
 
-/// The force comes from the particles' density.
+/// The vortex driven by the density of the particles.
 pub fn steady_vortex() -> Case {
     case(
         "steady_vortex",
@@ -44,7 +45,7 @@ pub fn steady_vortex() -> Case {
     )
 }
 
-/// The same force, fixed in space: what the elements alone can do.
+/// The vortex driven by the same force fixed in space, which shows the error of the elements alone.
 pub fn steady_vortex_without_particles() -> Case {
     case(
         "steady_vortex_fixed",

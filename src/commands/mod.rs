@@ -2,6 +2,7 @@
 
 mod check;
 mod chosen;
+mod columns;
 mod compare;
 mod cost;
 mod cost_page;
@@ -127,6 +128,8 @@ enum Command {
     Repair(repair::Args),
     /// Print versions, processor, memory, disk, viewer and ports, for a bug report
     Doctor(doctor::Args),
+    /// Print the columns of the series with units and meanings, as Markdown
+    Columns,
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -293,6 +296,7 @@ fn run_command(command: Command) -> Result<(), Failure> {
         Command::Export(args) => export::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Figure(args) => figure::run(&args),
+        Command::Columns => print(&columns::markdown()),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

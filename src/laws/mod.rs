@@ -6,9 +6,9 @@
 //! rates is the stress. Element matrices, internal forces and laminates use these functions; the
 //! conformance tests in `tests/physics/laws.rs` test the same functions.
 //!
-//! Each file states the equation of one law with its symbols, units and source. Source of the
-//! numbered equations: F. Dufour, H. Muehlhaus, L. Moresi, "Texture alignment in simple shear",
-//! equations (1)-(20). Rotations are positive counter-clockwise.
+//! Each file states the equation of one law with its symbols, units and source. The numbered
+//! equations (1)-(20) are those of F. Dufour, H. Muehlhaus, L. Moresi, "Texture alignment in simple
+//! shear". Rotations are positive counter-clockwise.
 
 pub mod cosserat;
 pub mod director;
@@ -28,11 +28,11 @@ use rates::Rates;
 /// of them may have changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dependence {
-    /// Quantities that particles carry.
+    /// Whether the law depends on quantities that particles carry.
     pub history: bool,
-    /// Rates of the last iterate.
+    /// Whether the law depends on the rates of the last iterate.
     pub rates: bool,
-    /// Pressure of the last iterate.
+    /// Whether the law depends on the pressure of the last iterate.
     pub pressure: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Moving the particles: position, director, volume.
+//! This module advects the particles: their positions, directors and volumes.
 
 use super::frozen_flow::{CELL_GRAIN, FrozenFlow};
 use super::gauges::Counter;
@@ -7,21 +7,24 @@ use crate::space::particles::{GONE, GRAIN, Particles};
 use crate::space::population::Count;
 use crate::threads::{self, Divisible};
 
-/// Where all particles come in a step, and what becomes of what they carry: kept from step to step.
+/// Positions, directors and volume factors of all particles after a step. The buffers are reused in
+/// the next step.
 #[derive(Default)]
 pub struct Displacements {
-    /// Not wrapped around periodic sides.
+    /// Positions, not wrapped around periodic sides.
     to: Vec<[f64; 2]>,
+    /// Cells of the positions; [`GONE`] for particles that left.
     cell: Vec<u32>,
+    /// Whether a wall stopped the particle.
     held: Vec<bool>,
-    /// Empty where nothing turns.
+    /// Directors; empty if the particles have none.
     director: Vec<[f64; 2]>,
-    /// Factors of volume; empty where no volume follows the flow.
+    /// Factors on the volumes; empty if no volume follows the flow.
     stretch: Vec<f64>,
 }
 
 impl Displacements {
-    /// Makes room; what was there is void.
+    /// Resizes the buffers; their contents are invalid afterwards.
     fn make_room(&mut self, particles: &Particles, effects: &EffectSet) {
         let n = particles.len();
         self.to.resize(n, [0.0; 2]);
@@ -32,9 +35,9 @@ impl Displacements {
     }
 }
 
-/// Those of the particles of some consecutive cells.
+/// The parts of the buffers of [`Displacements`] that belong to consecutive cells.
 struct Members<'a> {
-    /// First particle of each of these cells and of the next.
+    /// Index of the first particle of each of these cells and of the cell after them.
     start: &'a [u32],
     to: &'a mut [[f64; 2]],
     cell: &'a mut [u32],
@@ -45,7 +48,7 @@ struct Members<'a> {
 
 impl Divisible for Members<'_> {
     fn cut(self, at: usize) -> (Self, Self) {
-        /// A column may be absent.
+        /// Splits a column, which may be empty.
         fn split<T>(column: &mut [T], at: usize) -> (&mut [T], &mut [T]) {
             let at = at.min(column.len());
             column.split_at_mut(at)
@@ -75,8 +78,9 @@ impl Divisible for Members<'_> {
     }
 }
 
-/// Moves all particles through a step. `particles` must be sorted, and are sorted afterwards.
-/// `compliant`: volumes of such a material follow the flow, and its particles keep their mass.
+/// Advects all particles through a step. `particles` must be sorted by cell and are sorted
+/// afterwards. `compliant`: whether the particle volumes of a material follow the flow; their mass
+/// is constant.
 pub fn advance(
     frozen_flow: &FrozenFlow,
     particles: &mut Particles,

@@ -1,40 +1,43 @@
-//! The velocity that carries points: that of the solver, made divergence-free inside cells.
+//! This module computes the velocity that advects points: the solver's velocity, made
+//! divergence-free inside each cell.
 //!
-//! The divergence of a Q2 velocity vanishes only in the mean against the pressures `1, xi, eta`
-//! of its cell. What is left of it would make particles clump, so each cell's velocity is
+//! The divergence of a Q2 velocity is orthogonal to the pressures `1, xi, eta` of its cell but not
+//! zero. The remaining divergence would make particles cluster, so the velocity of each cell is
 //! corrected. With `U = u hy/2`, `V = v hx/2`, so that `div u = 4 (U,xi + V,eta) / (hx hy)`, and
-//! `U_ab` the coefficient of `xi^a eta^b`, the five terms of the divergence that the pressure
-//! does not see are
+//! `U_ab` the coefficient of `xi^a eta^b`, the five terms of the divergence that are
+//! orthogonal to the pressures are
 //!
 //! ```text
 //! U_12 (eta^2 - 1/3) + V_21 (xi^2 - 1/3) + 2 (U_21 + V_12) xi eta
 //!     + 2 U_22 xi (eta^2 - 1/3) + 2 V_22 eta (xi^2 - 1/3)
 //! ```
-//! and the smallest correction (in L2, of degree three) that removes them and leaves the normal
-//! velocity on the cell's edges as it is:
+//! and the smallest correction (in L2, of degree three) that removes them without changing the
+//! normal velocity on the edges of the cell is
 //!
 //! ```text
 //! U += V_21/3 (xi - xi^3) + S hy^2/(hx^2 + hy^2) eta (1 - xi^2)
 //!      - (1 - f)/3 U_22 (1 - xi^2)(1 - 3 eta^2) + 2 g/3 V_22 eta (xi - xi^3)
 //! S = U_21 + V_12    f = hx^2/(hx^2 + 5/21 hy^2)    g = hy^2/(hy^2 + 5/21 hx^2)
 //! ```
-//! and likewise `V` with the axes exchanged. The result is the curl of a bicubic stream function
-//! plus the divergence that the pressure sees (zero, or what a finite bulk viscosity lets be);
-//! smooth velocities keep their third order. The idea is that of Meyer and Jenny (2004) and of
-//! Wang, Agrusta and van Hunen (2015), who correct bilinear velocities.
+//! and likewise `V` with the axes exchanged. The result is the curl of a bicubic streamfunction
+//! plus the divergence in the space of the pressures (zero, or nonzero with a finite bulk
+//! viscosity). Smooth velocities keep their third order. Meyer and Jenny (2004) and Wang, Agrusta
+//! and van Hunen (2015) correct bilinear velocities in this way.
 //!
-//! Measured on a lid-driven cell of 16 x 16 cells, 10,000 steps at a Courant number of 1/2: the rms error of the particles' volume in a cell grows to 3.9 without the
-//! correction and stays at 0.24, that of particles placed at random, with it.
+//! Measured in a lid-driven cavity of 16 x 16 cells over 10,000 steps at a Courant number of 1/2:
+//! the rms error of the particle volume in a cell grows to 3.9 without the correction. With it, the
+//! error stays at 0.24, the value for randomly placed particles.
 
 use crate::simd::{dispatch, multiply_add};
 use crate::space::mesh::INSIDE;
 use crate::space::shape::NODES;
 use nalgebra::Matrix2;
 
-/// Coefficients of a polynomial, `[power across][power along]` the component's own direction.
+/// Coefficients of a polynomial, `[power across][power along]`, where "along" is the direction of
+/// the velocity component.
 type Coefficients = [[f64; 4]; 3];
 
-/// Velocity in one cell, as polynomials of its reference coordinates.
+/// Velocity in one cell: two polynomials in the reference coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CellVelocity {
     u: Coefficients,
@@ -42,7 +45,7 @@ pub struct CellVelocity {
 }
 
 impl CellVelocity {
-    /// From the velocities at the nodes of a cell of size `[hx, hy]`.
+    /// Corrected velocity from the nodal velocities of a cell of size `[hx, hy]`.
     pub fn new(nodal: &[[f64; 2]; NODES], [hx, hy]: [f64; 2]) -> Self {
         let u = biquadratic(|along, across| nodal[3 * across + along][0] * 0.5 * hy);
         let v = biquadratic(|along, across| nodal[3 * along + across][1] * 0.5 * hx);
@@ -53,11 +56,12 @@ impl CellVelocity {
         }
     }
 
+    /// Velocity at reference coordinates.
     pub fn at(&self, [xi, eta]: [f64; 2]) -> [f64; 2] {
         [value(&self.u, xi, eta), value(&self.v, eta, xi)]
     }
 
-    /// `L_ij = u_i,j` in a cell of size `[hx, hy]`.
+    /// Velocity gradient `L_ij = u_i,j` at reference coordinates in a cell of size `[hx, hy]`.
     pub fn gradient(&self, [xi, eta]: [f64; 2], [hx, hy]: [f64; 2]) -> Matrix2<f64> {
         let [along_u, across_u] = slopes(&self.u, xi, eta);
         let [along_v, across_v] = slopes(&self.v, eta, xi);
@@ -70,25 +74,25 @@ impl CellVelocity {
     }
 }
 
-/// Points that go through a step together.
+/// Number of points that are traced together.
 pub const TOGETHER: usize = 8;
 
-/// One number for each of some points, by direction.
+/// Values by direction and point.
 pub type Points = [[f64; TOGETHER]; 2];
 
-/// Where points of one cell go.
+/// Paths of points of one cell during a step.
 pub struct Ways {
-    /// Mean velocity of the step.
+    /// Mean velocities over the step.
     pub velocity: Points,
-    /// Reference coordinates of the middle.
+    /// Reference coordinates at the middle of the step.
     pub middle: Points,
-    /// Whether the way never leaves the cell; else all of this is void.
+    /// Whether the path stays inside the cell; otherwise the other values are invalid.
     pub inside: [bool; TOGETHER],
 }
 
 dispatch! {
-    /// The classical Runge-Kutta rule for points at the reference coordinates `r`; `step`: reference
-    /// coordinates that a unit velocity crosses in the step.
+    /// Traces points at the reference coordinates `r` with the classical Runge-Kutta method.
+    /// `step`: change of the reference coordinates by a unit velocity during the step.
     pub fn trace_points(current: &CellVelocity, r: &Points, step: [f64; 2]) -> Ways = ways_kernel
 }
 
@@ -115,8 +119,8 @@ fn ways_kernel<const LENGTH: usize, const FMA: bool>(
     Ways { velocity, middle, inside }
 }
 
-/// Places after a share of a step with velocity `k`, and whether they are still inside. (A closure
-/// would not be compiled for the instruction set of its function.)
+/// Positions after a fraction of a step with velocity `k`; clears `inside` for points that left the
+/// cell. (A closure would not be compiled for the instruction set of its function.)
 #[inline(always)]
 fn stage<const FMA: bool>(
     r: &Points,
@@ -144,7 +148,7 @@ impl CellVelocity {
     }
 }
 
-/// [`value`] at some points.
+/// [`value`] at several points.
 #[inline(always)]
 fn values<const FMA: bool>(
     c: &Coefficients,
@@ -166,7 +170,7 @@ fn values<const FMA: bool>(
     sum
 }
 
-/// Coefficients of the biquadratic with values `nodal(along, across)`, both 0, 1, 2.
+/// Coefficients of the biquadratic with the nodal values `nodal(along, across)`, both 0, 1, 2.
 fn biquadratic(nodal: impl Fn(usize, usize) -> f64) -> Coefficients {
     let quadratic =
         |[low, middle, high]: [f64; 3]| [middle, 0.5 * (high - low), 0.5 * (high + low) - middle];
@@ -182,7 +186,7 @@ fn biquadratic(nodal: impl Fn(usize, usize) -> f64) -> Coefficients {
     out
 }
 
-/// A component with its correction; `ratio`: (size along it / size across it)^2.
+/// A corrected velocity component. `ratio`: (cell size along it / cell size across it)^2.
 fn corrected(own: &Coefficients, other: &Coefficients, ratio: f64) -> Coefficients {
     const K: f64 = 5.0 / 21.0;
     let mut c = *own;
@@ -219,7 +223,7 @@ fn value(c: &Coefficients, along: f64, across: f64) -> f64 {
     row(&c[0], along) + across * (row(&c[1], along) + across * row(&c[2], along))
 }
 
-/// Reference derivatives along and across.
+/// Derivatives along and across with respect to the reference coordinates.
 fn slopes(c: &Coefficients, along: f64, across: f64) -> [f64; 2] {
     [
         row_slope(&c[0], along)
@@ -236,7 +240,7 @@ mod tests {
 
     const SIZE: [f64; 2] = [0.3, 0.7];
 
-    /// Nodal values in a cell around `centre`.
+    /// Nodal values of a field in a cell with the given centre.
     fn sampled(f: impl Fn(f64, f64) -> [f64; 2], [x, y]: [f64; 2]) -> [[f64; 2]; NODES] {
         std::array::from_fn(|k| {
             let (i, j) = ((k % 3) as f64 - 1.0, (k / 3) as f64 - 1.0);

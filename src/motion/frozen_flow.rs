@@ -1,4 +1,5 @@
-//! Transport of points through the velocity of the half step: second order in time.
+//! This module advects points through the velocity at the middle of the step, which is second order
+//! in time.
 
 use super::cell_velocity::{CellVelocity, Points, TOGETHER, trace_points};
 use crate::laws::director;
@@ -8,24 +9,26 @@ use crate::space::walls::{Enclosure, Landing};
 use crate::threads;
 use nalgebra::Matrix2;
 
-/// Cells that are worth a task of their own.
+/// Number of cells in a parallel task.
 pub const CELL_GRAIN: usize = 64;
 
-/// What carries points, cell by cell: kept from step to step.
+/// Corrected velocity of every cell. The buffer is reused in the next step.
 pub struct CellVelocities {
     cells: Vec<CellVelocity>,
-    /// Between a point of the cell and one of the up to nine around it there is never a wall, a side
-    /// of the domain or a seam.
+    /// Whether no wall, side of the domain or periodic seam lies between the points of the 3 x 3
+    /// cells around the cell.
     free: Vec<bool>,
 }
 
 impl CellVelocities {
+    /// Zero velocities on a mesh.
     pub fn new(mesh: &Mesh, enclosure: &Enclosure) -> Self {
         let free = (0..mesh.cells()).map(|cell| is_free(mesh, enclosure, cell)).collect();
         CellVelocities { cells: vec![CellVelocity::default(); mesh.cells()], free }
     }
 }
 
+/// Whether a cell and its neighbours contain no wall, solid, side or seam.
 fn is_free(mesh: &Mesh, enclosure: &Enclosure, cell: usize) -> bool {
     let (i, j) = mesh.cell_ij(cell);
     let amid = |k: usize, axis: &Axis| k > 0 && k + 1 < axis.cells();
@@ -41,38 +44,43 @@ fn is_free(mesh: &Mesh, enclosure: &Enclosure, cell: usize) -> bool {
         .any(|w| meets(block[w.normal], w.at, w.at) && meets(block[1 - w.normal], w.from, w.to))
 }
 
-/// A velocity field frozen at the middle of a step, and the walls in it.
+/// A velocity field frozen at the middle of a step, with the walls of the scene.
 pub struct FrozenFlow<'a> {
+    /// Mesh of the velocity field.
     pub mesh: &'a Mesh,
+    /// Walls, and sides through which points leave.
     pub enclosure: &'a Enclosure,
+    /// Length of the step, in the plan's units.
     pub dt: f64,
-    /// Of every cell, at the middle of the step.
+    /// Velocity of every cell at the middle of the step.
     velocities: &'a [CellVelocity],
     free: &'a [bool],
     simd: Simd,
 }
 
-/// Where a point goes in a step.
+/// Displacement of a point in a step.
 pub struct Displacement {
-    /// End of the step, not wrapped around periodic sides.
+    /// Position at the end of the step, not wrapped around periodic sides.
     pub to: [f64; 2],
-    /// It left the domain through an open side.
+    /// Whether the point left the domain through an open side.
     pub left: bool,
-    /// A wall held it back.
+    /// Whether a wall stopped the point.
     pub held: bool,
-    /// Cell and reference coordinates of its middle.
+    /// Cell and reference coordinates of the point at the middle of the step.
     pub middle: (usize, [f64; 2]),
-    /// The cell that it comes to, where that is known.
+    /// Cell at the end of the step, if known.
     pub cell: Option<usize>,
 }
 
-/// The cell that points start from.
+/// The cell in which points start.
 pub struct StartCell {
     cell: usize,
-    /// That cell, and those on either side of it, by direction; these only where it is free.
+    /// Spans of the cell and its two neighbours, by direction; the neighbours' spans are set only
+    /// if `free`.
     spans: [[Span; 3]; 2],
-    /// From a cell to the next, by direction.
+    /// Difference of the indices of neighbouring cells, by direction.
     stride: [usize; 2],
+    /// See [`CellVelocities`].
     free: bool,
 }
 
@@ -81,8 +89,8 @@ impl StartCell {
         [0, 1].map(|c| self.spans[c][1].reference(p[c]))
     }
 
-    /// The cell, of this one and of those around it, that certainly holds a place, and where in it
-    /// that is.
+    /// The cell among this one and its neighbours that certainly contains a point, with the
+    /// reference coordinates of the point; `None` if there is none.
     fn near(&self, p: [f64; 2]) -> Option<(usize, [f64; 2])> {
         let (mut cell, mut r) = (self.cell, self.reference(p));
         for c in 0..2 {
@@ -108,7 +116,7 @@ impl StartCell {
 }
 
 impl<'a> FrozenFlow<'a> {
-    /// `velocity`: at the nodes, of the middle of the step.
+    /// The frozen field of a step of length `dt`. `velocity`: nodal velocities at its middle.
     pub fn new(
         mesh: &'a Mesh,
         enclosure: &'a Enclosure,
@@ -124,7 +132,7 @@ impl<'a> FrozenFlow<'a> {
         FrozenFlow { mesh, enclosure, dt, velocities: cells, free, simd: Simd::used() }
     }
 
-    /// A cell to start from.
+    /// The start cell with an index.
     pub fn home(&self, cell: usize) -> StartCell {
         let (i, j) = self.mesh.cell_ij(cell);
         let free = self.free[cell];
@@ -140,8 +148,9 @@ impl<'a> FrozenFlow<'a> {
         }
     }
 
-    /// Velocity at a place reached from `p`, walls and periodic sides respected, and where it
-    /// is; where the way leaves the domain, that of the start.
+    /// Velocity at the point reached from `p` with velocity `u` after `dt`, and the cell and
+    /// reference coordinates of that point. The path respects walls and periodic sides. If it
+    /// leaves the domain, the start point is used.
     fn stage(
         &self,
         home: &StartCell,
@@ -162,10 +171,10 @@ impl<'a> FrozenFlow<'a> {
         (self.velocities[cell].at(r), (cell, r))
     }
 
-    /// The classical fourth-order Runge-Kutta rule from `p` in its cell. The field is frozen at the
-    /// middle of the step, so the order in time is that of the field; the high order in space
-    /// keeps the distances of particles: a midpoint rule changes areas by `(dt |grad u|)^4 / 4`
-    /// a step, this one by `(dt |grad u|)^6 / 72`.
+    /// Advects a point from `p` with the classical fourth-order Runge-Kutta method. The field is
+    /// frozen at the middle of the step, so the order in time is that of the field. The high order
+    /// in space preserves the distances between particles: a midpoint rule changes areas by
+    /// `(dt |grad u|)^4 / 4` per step, this method by `(dt |grad u|)^6 / 72`.
     pub fn travel(&self, home: &StartCell, p: [f64; 2]) -> Displacement {
         let dt = self.dt;
         let k1 = self.velocities[home.cell].at(home.reference(p));
@@ -185,7 +194,8 @@ impl<'a> FrozenFlow<'a> {
         Displacement { to, left, held, middle, cell: None }
     }
 
-    /// The ways of the points of one cell: those that stay inside it together, the others one by one.
+    /// Advects the points of one cell and calls `arrive` with the index and displacement of each.
+    /// Points that stay inside the cell are traced together, the others one by one.
     pub fn travel_all(
         &self,
         cell: usize,
@@ -216,12 +226,12 @@ impl<'a> FrozenFlow<'a> {
         }
     }
 
-    /// Velocity gradient at the middle of a displacement.
+    /// Velocity gradient at a cell and reference coordinates, such as the middle of a displacement.
     pub fn gradient(&self, (cell, r): (usize, [f64; 2])) -> Matrix2<f64> {
         self.velocities[cell].gradient(r, self.mesh.cell_size(cell))
     }
 
-    /// A director after the step under a velocity gradient.
+    /// The director `n` after the step under the velocity gradient `l`.
     pub fn turn(&self, n: [f64; 2], l: &Matrix2<f64>) -> [f64; 2] {
         director::advance(&n.into(), l, self.dt).into()
     }

@@ -1,5 +1,5 @@
-//! Counting a material across a segment: by the particles that cross, and by the flux of the
-//! velocity field.
+//! This module measures the transport of a material across a segment in two ways: it counts the
+//! particles that cross, and it integrates the flux of the velocity field.
 
 use crate::plan::Gauge;
 use crate::space::flow::Flow;
@@ -8,25 +8,28 @@ use crate::space::particles::Particles;
 use crate::space::segment::Segment;
 use crate::space::shape::Shape;
 
-/// A gauge and the volume that has crossed it.
+/// A gauge with the volume that has crossed it.
 #[derive(Clone, Debug)]
 pub struct Counter {
+    /// The gauge.
     pub gauge: Gauge,
-    /// Net volume of the gauge's material along its direction since the start.
+    /// Net volume per depth of the gauge's material that has crossed along its direction since the
+    /// start, in the plan's units.
     pub volume: f64,
 }
 
-/// Samples of the flux along a cell's edge.
+/// Number of flux samples along the edge of a cell.
 const SAMPLES: usize = 8;
-/// Width of the kernel that finds the material at a sample, in cells.
+/// Width of the kernel that determines the material at a sample, in cells.
 const KERNEL_WIDTH: f64 = 0.25;
 
 impl Counter {
+    /// A counter at zero.
     pub fn new(gauge: Gauge) -> Self {
         Counter { gauge, volume: 0.0 }
     }
 
-    /// Counts a particle's straight path (not wrapped).
+    /// Counts a particle if its straight path (not wrapped) crosses the gauge.
     pub fn pass(&mut self, mesh: &Mesh, from: [f64; 2], to: [f64; 2], material: u8, volume: f64) {
         let Gauge { segment: s, sign, .. } = self.gauge;
         if material != self.gauge.material {
@@ -49,8 +52,9 @@ impl Counter {
         }
     }
 
-    /// Flux of the material along the gauge's direction, from the velocity field; the material
-    /// at a sample is a kernel mean over the particles of the cell upstream.
+    /// Flux of the material along the gauge's direction, from the velocity field, in the plan's
+    /// units. The fraction of the material at a sample is a kernel mean over the particles of the
+    /// upstream cell.
     pub fn rate<const D: usize>(
         &self,
         mesh: &Mesh,
@@ -87,7 +91,7 @@ impl Counter {
     }
 }
 
-/// Share of a material near a point among the particles of a cell.
+/// Volume fraction of a material near a point, from the particles of a cell.
 fn fraction(
     mesh: &Mesh,
     particles: &Particles,
@@ -105,7 +109,7 @@ fn fraction(
     for q in range {
         let (dx, dy) = (particles.position[q][0] - p[0], particles.position[q][1] - p[1]);
         let r2 = (dx / hx).powi(2) + (dy / hy).powi(2);
-        // The floor keeps the nearest particles in charge where all are far.
+        // The constant avoids a zero sum of weights if all particles are far from the point.
         let w = particles.volume[q] * ((-r2 / (KERNEL_WIDTH * KERNEL_WIDTH)).exp() + 1e-30);
         all += w;
         mine += if particles.material[q] == material { w } else { 0.0 };

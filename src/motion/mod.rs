@@ -1,4 +1,4 @@
-//! What moves with the flow: particles with their history, dye lines, and gauges that count.
+//! This module advects particles and dye lines with the flow, and measures outflow at gauges.
 
 pub mod advect;
 pub mod cell_velocity;

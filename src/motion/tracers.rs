@@ -1,35 +1,40 @@
-//! Dye: passive polylines, refined as they stretch so that they stay smooth.
+//! This module advects dye lines: passive polylines that are refined as they stretch.
 
 use super::frozen_flow::FrozenFlow;
 use crate::plan::Tracers;
 use crate::space::mesh::Mesh;
 
-/// Beyond this many points lines are refined no further; a warning says so.
+/// Largest number of points; beyond it the lines are not refined, and a warning is given.
 const MAX_POINTS: usize = 200_000;
 
-/// Lines of dye. Points are not wrapped around periodic sides, so a line stays connected.
+/// Dye lines. Their points are not wrapped around periodic sides, so a line stays connected.
 #[derive(Clone, Debug)]
 pub struct DyeLines {
+    /// Points of each line, in the plan's units.
     pub lines: Vec<Vec<[f64; 2]>>,
+    /// Largest distance of consecutive points.
     spacing: f64,
-    /// Where a line is written anew.
+    /// Buffer for a refined line.
     room: Vec<[f64; 2]>,
 }
 
 impl DyeLines {
+    /// The dye lines of a plan at the start.
     pub fn new(plan: &Tracers) -> Self {
         DyeLines { lines: plan.lines.clone(), spacing: plan.spacing, room: Vec::new() }
     }
 
+    /// Number of points of all lines.
     pub fn points(&self) -> usize {
         self.lines.iter().map(Vec::len).sum()
     }
-    /// Refinement has stopped.
+    /// Whether the largest number of points is reached and refinement has stopped.
     pub fn is_full(&self) -> bool {
         self.points() >= MAX_POINTS
     }
 
-    /// Moves all points through a step, then refines stretched and thins crowded parts.
+    /// Advects all points through a step, then adds points where lines are stretched and removes
+    /// points that are too close together.
     pub fn advance(&mut self, frozen_flow: &FrozenFlow) {
         let mesh = frozen_flow.mesh;
         for line in &mut self.lines {
@@ -45,12 +50,12 @@ impl DyeLines {
         let mut more = MAX_POINTS.saturating_sub(self.points());
         for line in &mut self.lines {
             respace(line, &mut self.room, self.spacing, &mut more);
-            // The room of the line, which it may need again, stays its own.
+            // `clone_from` keeps the allocation of the line.
             line.clone_from(&self.room);
         }
     }
 
-    /// The lines as drawn: wrapped into the domain and cut where they cross a periodic side.
+    /// The lines for display: wrapped into the domain and cut where they cross a periodic side.
     pub fn wrapped(&self, mesh: &Mesh) -> Vec<Vec<[f64; 2]>> {
         let mut out = Vec::new();
         for line in &self.lines {
@@ -78,8 +83,8 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// Writes the line with points inserted where they are farther apart than `spacing`, `more` at most,
-/// and left out where they crowd.
+/// Copies a line to `out`. It inserts at most `more` points where the distance exceeds `spacing`
+/// and omits points that are too close together.
 fn respace(line: &[[f64; 2]], out: &mut Vec<[f64; 2]>, spacing: f64, more: &mut usize) {
     out.clear();
     for (k, &p) in line.iter().enumerate() {
@@ -100,8 +105,8 @@ fn respace(line: &[[f64; 2]], out: &mut Vec<[f64; 2]>, spacing: f64, more: &mut 
     }
 }
 
-/// Point halfway from `b` to `c` on the cubic through four points; on the chord where the cubic
-/// strays, as at folds.
+/// Point halfway between `b` and `c` on the cubic through four points, or on the chord if the cubic
+/// is far from it, as at folds.
 fn between(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> [f64; 2] {
     let chord = [0.5 * (b[0] + c[0]), 0.5 * (b[1] + c[1])];
     let cubic: [f64; 2] = std::array::from_fn(|k| (9.0 * (b[k] + c[k]) - a[k] - d[k]) / 16.0);

@@ -1,4 +1,5 @@
-//! A run with its guard and the counts for its summary: what every way of driving a run has in common.
+//! This module combines a run with its guard and the counts for its summary. All commands that take
+//! guarded steps use it.
 
 use crate::frame::{Frame, Snapshot};
 use crate::plan::{Plan, Warning};
@@ -10,7 +11,7 @@ use crate::sim::{Run, SimError, snapshot};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A guarded run.
+/// A run with a guard and the counts for its summary.
 pub struct Drive {
     /// Plan of the run.
     pub plan: Arc<Plan>,
@@ -42,7 +43,7 @@ impl Drive {
         self.guard.begin(self.run.as_ref())
     }
 
-    /// Takes a step under the guard, and returns what there is to be noted about it.
+    /// Takes a step under the guard, and returns notes about faults and repetitions.
     ///
     /// # Errors
     /// The step failed and could not be repaired. The run is then at its last valid state.
@@ -58,7 +59,7 @@ impl Drive {
         self.guard.good()
     }
 
-    /// Whether a frame is due at the current time; counts it.
+    /// Whether a frame is due at the current time; if so, the frame is counted.
     pub fn frame_is_due(&mut self) -> bool {
         self.plan.frame_is_due(self.run.row().time, &mut self.frames)
     }
@@ -73,18 +74,18 @@ impl Drive {
     }
 }
 
-/// Frame of the current state without numbers: one that no row belongs to.
+/// Frame that holds only a snapshot of the current state, without the values of a row.
 pub fn snapshot_alone(run: &dyn Run, wall_s: f64, snapshot: Snapshot) -> Frame {
     let (step, time_s) = (run.row().step, run.row().time);
     Frame { step, time_s, wall_s, snapshot: Some(snapshot), ..Frame::default() }
 }
 
-/// Warnings of a plan.
+/// Warnings of a plan as text.
 pub fn warnings(plan: &Plan) -> Vec<String> {
     plan.warnings.iter().map(ToString::to_string).collect()
 }
 
-/// The warning that frames do not show every particle, if that is so.
+/// The warning that frames do not show every particle; `None` if they do.
 pub fn thinned(plan: &Plan, run: &dyn Run) -> Option<String> {
     let every = snapshot::thinning(plan, snapshot::drawn(plan, run.particles()).len());
     (every > 1).then(|| Warning::ParticlesThinned { every }.to_string())

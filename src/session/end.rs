@@ -1,4 +1,4 @@
-//! The end of a session: closes the recording, writes plots and summary.
+//! This module ends a session: it closes the recording and writes the plots and the summary.
 
 use super::error::SessionError;
 use super::files::Session;
@@ -11,7 +11,7 @@ use crate::sim::Run;
 use crossbeam::channel::bounded;
 use std::path::PathBuf;
 
-/// What remains when all files are closed.
+/// Results of a session after all files are closed.
 pub struct Ended {
     /// The summary.
     pub summary: Summary,
@@ -19,22 +19,22 @@ pub struct Ended {
     pub json: String,
     /// Path and size (bytes) of the recording.
     pub recorded: Option<(PathBuf, u64)>,
-    /// The viewer that this process still serves.
+    /// The viewer that this process serves.
     pub served: Option<Served>,
-    /// Why the run has no result.
+    /// The error or interrupt that ended the run, if any.
     pub failure: Option<SessionError>,
-    /// Whether the plots could be written.
+    /// Outcome of writing the plots.
     pub plotted: Result<(), SessionError>,
     /// Step of the last checkpoint.
     pub kept: Option<u64>,
     /// Wall time of the whole run (s).
     pub wall: f64,
-    /// Set by an interrupt.
+    /// Flag that an interrupt sets.
     pub interrupted: Interrupted,
 }
 
 impl Session {
-    /// Runs on a thread of its own while this thread shows the progress; then closes all files.
+    /// Runs on a separate thread while this thread shows the progress; then closes all files.
     ///
     /// # Errors
     /// The thread cannot be started, or the summary cannot be written.
@@ -65,7 +65,8 @@ impl Session {
         }
     }
 
-    /// Runs on this thread; then closes all files. `watch` is called at the start and after every step.
+    /// Runs on this thread, then closes all files. `watch` is called at the start and after every
+    /// step.
     ///
     /// # Errors
     /// The run failed, or a file could not be written.
@@ -76,7 +77,7 @@ impl Session {
         ended.failure.map_or(Ok(ended.summary), Err)
     }
 
-    /// Closes the recording, writes plots and summary.
+    /// Closes the recording and writes the plots and the summary.
     fn end(mut self, outcome: Result<Ending, SessionError>) -> Result<Ended, SessionError> {
         let mut served = None;
         let mut recorded = None;
@@ -131,8 +132,8 @@ impl Session {
         Ok(Ended { summary, json, recorded, served, failure, plotted, kept, wall, interrupted })
     }
 
-    /// Plots the table. Rows are not kept in memory meanwhile: a run of millions of steps takes no
-    /// more memory than a short one.
+    /// Plots the table. Rows are read from the file and not kept during the run, so memory use does
+    /// not grow with the number of steps.
     fn plot(&self) -> Result<(), SessionError> {
         let plan = &self.drive.plan;
         let rows = series::rows(&self.folder.join("series.csv"), plan)

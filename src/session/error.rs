@@ -1,10 +1,10 @@
-//! Errors of a session.
+//! This module holds the errors of a session.
 
 use crate::record::plots::PlotError;
 use crate::record::rerun_log::RecordError;
 use crate::sim::SimError;
 
-/// Why a session ended without a result.
+/// The reason why a session failed or was interrupted.
 #[derive(Debug)]
 pub enum SessionError {
     /// The simulation failed.

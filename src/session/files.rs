@@ -1,4 +1,4 @@
-//! A run with everything that it writes: series, recording, checkpoints.
+//! This module runs a plan and writes its series, recording and checkpoints.
 
 use super::drive::{self, Drive};
 use super::error::SessionError;
@@ -21,23 +21,23 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Limits the time of a run.
+/// A limit on the wall time of a run.
 pub trait Budget: Send {
     /// Whether a further step, as long as the last one (s), would exceed the budget.
     fn is_spent(&self, clock: &Instant, last_step: f64) -> bool;
-    /// What was expected and what it took (s).
+    /// The expected and the actual cost of the run. `wall`: wall time of the run, s.
     fn receipt(&self, run: &dyn Run, wall: f64) -> Purchase;
 }
 
-/// A run with all its output.
+/// A run with all its output files.
 pub struct Session {
     pub(super) drive: Drive,
     pub(super) folder: PathBuf,
     pub(super) series: SeriesWriter,
-    /// Path of the recording.
+    /// Path of the recording, if any.
     pub(super) recording: Option<PathBuf>,
     pub(super) logger: Option<Logger>,
-    /// Start of this part of the run.
+    /// Start time of this part of the run.
     clock: Instant,
     /// Totals of the earlier parts of the run: wall time (s), frames, and time of the logger (s).
     pub(super) before: (f64, Traffic, f64),
@@ -45,20 +45,20 @@ pub struct Session {
     scene_hash: String,
     /// Step of the last checkpoint.
     pub(super) kept: Option<u64>,
-    /// Set by an interrupt.
+    /// Flag that an interrupt sets.
     pub(super) interrupted: Interrupted,
     /// Whether the initial state has been written.
     begun: bool,
     /// Largest number of steps.
     steps: Option<u64>,
     pub(super) quiet: bool,
-    /// Limit of the time; `None` runs to the end.
+    /// Limit on the wall time, if any.
     pub(super) budget: Option<Box<dyn Budget>>,
 }
 
 impl Session {
-    /// Starts the run of a plan in a folder that `prepare` makes. The simulation starts first, so that a
-    /// scene that cannot start leaves no folder.
+    /// Starts the run of a plan in the folder that `prepare` creates. The simulation starts before
+    /// the folder is created, so a scene that cannot start leaves no folder.
     ///
     /// # Errors
     /// The simulation, the folder or a viewer cannot be started.
@@ -119,11 +119,11 @@ impl Session {
         })
     }
 
-    /// Resumes the run of a folder from a state. The table continues after the row of the state, the
-    /// recording after its step.
+    /// Resumes the run of a folder from a state. The table and the recording continue after the
+    /// step of the state.
     ///
     /// # Errors
-    /// The state does not fit, or a file or viewer is not available.
+    /// The state does not fit the plan, or a file or viewer is not available.
     pub fn reopen(
         options: &Options,
         plan: &Arc<Plan>,
@@ -166,17 +166,17 @@ impl Session {
         })
     }
 
-    /// Limits the time of the run.
+    /// Sets the limit on the wall time of the run.
     pub fn with_budget(self, budget: Option<Box<dyn Budget>>) -> Session {
         Session { budget, ..self }
     }
 
-    /// Seconds since the run began, without the pauses between its parts.
+    /// Wall time of the run without the pauses between its parts, s.
     pub(super) fn wall(&self) -> f64 {
         self.before.0 + self.clock.elapsed().as_secs_f64()
     }
 
-    /// Frames of the whole run, and the time of the logger (s).
+    /// Frame counts of the whole run, and the time of the logger (s).
     fn traffic(&self) -> (Traffic, f64) {
         let (_, frames, busy) = self.before;
         match &self.logger {
@@ -200,6 +200,7 @@ impl Session {
         self.keep_state()
     }
 
+    /// Writes the last valid state as a checkpoint.
     fn keep_state(&mut self) -> Result<(), SessionError> {
         let step = self.drive.run.row().step;
         let mut state = self.drive.good().clone();
@@ -217,7 +218,8 @@ impl Session {
         Ok(())
     }
 
-    /// Takes all steps. `watch` is called at the start and after every step.
+    /// Takes all steps, and records the final state. `watch` is called at the start and after every
+    /// step.
     pub(super) fn compute(&mut self, watch: impl FnMut(&dyn Run)) -> Result<Ending, SessionError> {
         let outcome = self.steps(watch);
         self.keep_the_end(&outcome);
@@ -235,7 +237,8 @@ impl Session {
         outcome
     }
 
-    /// Writes the last valid state of a run that ends before its end, for `grainscope resume`.
+    /// Writes the last valid state of a run that stops before its end time, for
+    /// `grainscope resume`.
     fn keep_the_end(&mut self, outcome: &Result<Ending, SessionError>) {
         let wanted = match outcome {
             Ok(Ending::Finished) => false,
@@ -249,10 +252,11 @@ impl Session {
         if let Err(e) = self.checkpoint().or_else(|_| self.keep_state())
             && let Some(e) = e.describe()
         {
-            self.note(format!("the last state is not kept: {e}"));
+            self.note(format!("the last state could not be saved: {e}"));
         }
     }
 
+    /// Prints a warning and adds it to the summary.
     fn note(&mut self, warning: String) {
         if !self.quiet {
             tell(format_args!("warning: {warning}"));
@@ -296,7 +300,7 @@ impl Session {
         Ok(Ending::Finished)
     }
 
-    /// Writes the current state to the table and to the recording.
+    /// Writes the current row to the table, and a frame to the recording.
     fn observe(&mut self, notes: Vec<String>) -> Result<(), SessionError> {
         let clock = Instant::now();
         let table = self.folder.join("series.csv");
@@ -323,8 +327,8 @@ fn ended_early() -> SessionError {
     SessionError::Environment("the recording ended early".into())
 }
 
-/// Starts the logger of a run at its initial state or at a later one. Returns the logger, if any, and
-/// the warnings so far.
+/// Starts the logger of a run at its current step. Returns the logger, if any, and the warnings so
+/// far.
 fn start_logger(
     options: &Options,
     plan: &Plan,
@@ -366,7 +370,7 @@ fn start_logger(
         SessionError::Environment(format!("the logger thread cannot be started: {e}"))
     })?;
     if step > 0 && last_step != Some(step) {
-        // The recording ended before this step.
+        // The recording does not contain this step.
         let wall = run.row().wall;
         let frame = info::frame(plan, run.row(), wall, Some(run.snapshot()), vec![]);
         logger.send(frame).map_err(|_| ended_early())?;

@@ -1,11 +1,11 @@
-//! Interrupts of the user, and messages on the terminal.
+//! This module handles interrupts by the user, and writes messages to the terminal.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Set by an interrupt; a run then ends after its step.
+/// A flag that an interrupt sets; a run then ends after its current step.
 pub type Interrupted = Arc<AtomicBool>;
 
 /// Handles interrupts: the first sets the flag, a second ends the program with the given exit code.
@@ -18,7 +18,7 @@ pub fn watch_interrupts(exit_code: u8) -> Interrupted {
         }
     });
     if let Err(e) = watching {
-        tell(format_args!("warning: interrupts end the program at once: {e}"));
+        tell(format_args!("warning: an interrupt will end the program at once: {e}"));
     }
     interrupted
 }
@@ -36,7 +36,7 @@ pub fn tell(text: impl std::fmt::Display) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// A progress bar on stderr with this many units, with or without a message.
+/// A progress bar on stderr with a number of units, with or without a message.
 pub fn progress_bar(units: u64, message: bool) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(units), ProgressDrawTarget::stderr_with_hz(8));
     let template = if message {

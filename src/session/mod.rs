@@ -1,7 +1,8 @@
-//! Drives runs: options, guard, output, interrupts, timing and the end, for every command that computes.
+//! This module drives runs for all commands that compute: options, guard, output, interrupts,
+//! timing and the end of a run.
 //!
-//! [`Session`] is a run with all its files; [`Drive`] is the guarded run inside, which the explorer
-//! uses too; [`march`] takes steps without a guard, for measurements.
+//! [`Session`] is a run with all its output files. [`Drive`] is the guarded run in a session; the
+//! explorer uses it too. [`march`] takes steps without a guard, for measurements.
 
 mod drive;
 mod end;

@@ -1,4 +1,4 @@
-//! Options of a session: where its output goes, how it is guarded, and when it stops.
+//! This module holds the options of a session: its output, its guard, and when it stops.
 
 use crate::record::rerun_log::Sink;
 use crate::sim::guard::Policy;
@@ -37,7 +37,7 @@ impl Safety {
         }
     }
 
-    /// These options, with those that are not given taken from `before`.
+    /// These options; options that are not given are taken from `before`.
     pub fn or(self, before: Safety) -> Safety {
         Safety {
             checkpoint_every: self.checkpoint_every.or(before.checkpoint_every),
@@ -57,6 +57,9 @@ impl Safety {
     }
 
     /// Loads the options from a checkpoint's state.
+    ///
+    /// # Errors
+    /// The state does not contain them.
     pub fn load(state: &State) -> Result<Safety, StateError> {
         let [every, policy] = state.tally("session.safety")?;
         let on_fault = match policy {
@@ -69,7 +72,7 @@ impl Safety {
     }
 }
 
-/// Where the recording of a run goes besides viewers.
+/// The file of a recording; viewers are separate options.
 #[derive(Clone, Debug, Default)]
 pub enum Recording {
     /// No recording.
@@ -77,14 +80,14 @@ pub enum Recording {
     /// `recording.rrd` in the folder of the run.
     #[default]
     Folder,
-    /// A file elsewhere.
+    /// Another file.
     File(PathBuf),
 }
 
-/// How a session runs.
+/// Options of a session.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Where the recording goes.
+    /// The file of the recording.
     pub recording: Recording,
     /// Viewers that receive the frames.
     pub viewers: Vec<Sink>,
@@ -92,6 +95,6 @@ pub struct Options {
     pub safety: Safety,
     /// Largest number of steps, counted from the start of the run.
     pub steps: Option<u64>,
-    /// Print no messages: those of several runs at once would mix.
+    /// Whether to print no messages; messages of several concurrent runs would mix.
     pub quiet: bool,
 }

@@ -1,4 +1,4 @@
-//! The data of a checkpoint besides the state of the simulation.
+//! This module saves and loads the data of a checkpoint other than the state of the simulation.
 
 use super::options::Safety;
 use crate::record::logger::Traffic;
@@ -7,11 +7,11 @@ use crate::sim::state::{State, StateError, load_phases, save_phases};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The data of a checkpoint besides the state of the simulation.
+/// The data of a checkpoint other than the state of the simulation.
 pub struct Past {
     /// Counts for the summary.
     pub tally: Tally,
-    /// Wall time (s), frames, and time of the logger (s).
+    /// Wall time (s), frame counts, and time of the logger (s).
     pub before: (f64, Traffic, f64),
     /// Path of the recording.
     pub recording: Option<PathBuf>,
@@ -22,7 +22,7 @@ pub struct Past {
 }
 
 impl Past {
-    /// Writes it beside the state. `folder`: of the run.
+    /// Adds the data to a state. `folder`: folder of the run.
     pub fn save(&self, state: &mut State, folder: &Path) {
         save_phases("session.phases", &self.tally.phases, state);
         let (wall, traffic, busy) = self.before;
@@ -54,7 +54,10 @@ impl Past {
         state.put_bytes("session.program", env!("CARGO_PKG_VERSION").bytes());
     }
 
-    /// Reads what [`Past::save`] wrote.
+    /// Loads the data that [`Past::save`] wrote. `folder`: folder of the run.
+    ///
+    /// # Errors
+    /// The state does not contain them.
     pub fn load(state: &State, folder: &Path) -> Result<Past, StateError> {
         let [wall, power, divergence, energy, waited, busy, set_up, guard, writing] =
             state.numbers("session.numbers")?;

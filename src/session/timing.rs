@@ -1,11 +1,11 @@
-//! Time that work takes, and loops over the steps of a run.
+//! This module measures the time of work, and takes the steps of a run without a guard.
 
 use crate::sim::{Run, SimError};
 use crate::threads;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-/// CPU time and wall-clock time.
+/// CPU time and wall-clock time of some work.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Took {
     /// CPU time, s.
@@ -46,8 +46,8 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Took) {
     (result, Took { cpu, wall })
 }
 
-/// Takes steps until the end of a run, or until `watch` breaks off; without a guard: a failed step is
-/// the result. `watch` is called after every step with the time that it took on this thread alone.
+/// Takes steps without a guard until the end of a run or until `watch` returns `Break`. `watch` is
+/// called after every step with the time of the step on this thread alone.
 ///
 /// # Errors
 /// A step failed.

@@ -1,33 +1,33 @@
-//! Choosing the time step, by named limiters.
+//! This module chooses the time step as the smallest of several named limits.
 
 use crate::plan::ClockPlan;
 use crate::space::mesh::Mesh;
 use serde::Serialize;
 
-/// What set the size of a step.
+/// The limit that determined the length of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limiter {
-    /// No step was taken: row 0.
+    /// No step: the row of the initial state.
     Start,
-    /// `time.courant`: cells crossed.
+    /// `time.courant`: number of cells crossed.
     Courant,
     /// `time.strain`: strain of layered material.
     Strain,
-    /// `time.max_step`
+    /// `time.max_step`: largest step.
     MaxStep,
-    /// Many times the relaxation time of the stratification.
+    /// A multiple of the relaxation time of the stratification.
     Relaxation,
-    /// Steps grow by no more than a half each.
+    /// A step may exceed the previous one by at most half.
     Growth,
-    /// A frame, a scheduled change or the end had to be met.
+    /// The time of a frame, of a scheduled change or of the end.
     Stop,
-    /// The step was cut because a longer one failed.
+    /// The step was shortened because a longer one failed.
     Guard,
 }
 
 impl Limiter {
-    /// All limiters; states of runs number them by their place here: new ones go to the end.
+    /// All limiters. Saved states contain their index here, so new ones must be appended.
     pub const ALL: [Limiter; 8] = [
         Limiter::Start,
         Limiter::Courant,
@@ -39,6 +39,7 @@ impl Limiter {
         Limiter::Guard,
     ];
 
+    /// Name in `series.csv`.
     pub fn name(self) -> &'static str {
         match self {
             Limiter::Start => "start",
@@ -53,21 +54,21 @@ impl Limiter {
     }
 }
 
-/// What the flow and its matter say about the step.
+/// Quantities of the flow and the materials that limit the step, in the plan's units.
 #[derive(Clone, Copy, Debug)]
 pub struct Speeds {
     /// Largest number of cells crossed per unit time.
     pub crossings: f64,
     /// Largest strain rate of layered material.
     pub strain_rate: f64,
-    /// Longest step that the stratification stands.
+    /// Largest step for a stable stratification; `None` if there is none.
     pub relaxation: Option<f64>,
 }
 
-/// Growth of the step from one to the next: extrapolation of the velocity needs similar steps.
+/// Largest ratio of consecutive steps; the extrapolation of the velocity needs similar steps.
 const GROWTH: f64 = 1.5;
 
-/// The next step from `time`, after one of `previous`.
+/// Length and limiter of the step that starts at `time`; `previous`: length of the previous step.
 pub fn next_step(
     clock: &ClockPlan,
     time: f64,
@@ -97,21 +98,22 @@ pub fn next_step(
     if dt >= remaining {
         (remaining, Limiter::Stop)
     } else if dt > 0.5 * remaining {
-        // Two equal steps instead of one full and one tiny.
+        // Two equal steps instead of a full and a very short one.
         (0.5 * remaining, name)
     } else {
         (dt, name)
     }
 }
 
-/// A particle may cross this many cells that grading made small for one usual cell: their rows
-/// reach across the domain and know nothing of the flow far from what they are for. On the silo,
-/// lips graded by 8, outflow at 0.7 ms was 4.077 in steps of four small cells (half a usual one)
-/// and 4.078 in steps of two, which are half as many again.
+/// Number of cells refined by grading that count as one crossed cell, up to the size of the largest
+/// cell: rows of refined cells extend across the domain, also to where the flow needs no
+/// refinement. In the silo with lips graded by 8, the outflow at 0.7 ms was 4.077 with steps of
+/// four small cells (half a usual cell) and 4.078 with steps of two, which needed half as many
+/// steps again.
 const GRADED_ALLOWANCE: f64 = 8.0;
 
-/// What a unit velocity of each node crosses per unit time, in the smallest of its cells as they
-/// count; nothing where all are solid.
+/// Number of cells that a unit velocity at each node crosses per unit time, by direction, for the
+/// smallest cell at the node (see `GRADED_ALLOWANCE`); zero if all its cells are solid.
 pub fn crossing_rates(mesh: &Mesh) -> Vec<[f64; 2]> {
     let usual =
         [&mesh.x, &mesh.y].map(|axis| (0..axis.cells()).map(|k| axis.size(k)).fold(0.0, f64::max));

@@ -1,4 +1,4 @@
-//! Bounds that every run must satisfy at every step, whoever runs it.
+//! This module holds the bounds that every run must satisfy at every step.
 
 use serde::Serialize;
 

@@ -1,40 +1,74 @@
-//! Why a run cannot start or continue, and what the user can do about it.
+//! This module holds the errors of a run, and what the user can do about them.
 
 use super::fault::Fault;
 use super::initial::Unfilled;
 use crate::composition::EmptyCell;
 use crate::solve::report::SolveError;
 
-/// Why a run cannot start or go on.
+/// Why a run cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
+    /// A point of the domain has no material.
     #[error(transparent)]
     Unfilled(#[from] Unfilled),
+    /// A cell has no particles and no background material.
     #[error("step {step}, t = {time:.6e} s: {source}")]
-    Empty { step: u64, time: f64, source: EmptyCell },
+    Empty {
+        /// Number of the step.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// The cell.
+        source: EmptyCell,
+    },
+    /// The solver failed.
     #[error("step {step}, t = {time:.6e} s: {source}")]
-    Solve { step: u64, time: f64, source: SolveError },
+    Solve {
+        /// Number of the step.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// Error of the solver.
+        source: SolveError,
+    },
+    /// The time step is too short to advance the time, or not a number.
     #[error("step {step}, t = {time:.6e} s: the time step has become {dt:.1e} s")]
-    Step { step: u64, time: f64, dt: f64 },
-    /// The step was taken, but its result cannot be.
+    Step {
+        /// Number of the step.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// Time step, s.
+        dt: f64,
+    },
+    /// The step was taken, but the new state is invalid.
     #[error("step {step}, t = {time:.6e} s: {fault}")]
-    Fault { step: u64, time: f64, fault: Fault },
-    /// Shorter steps do not help either.
+    Fault {
+        /// Number of the step.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// The fault of the state.
+        fault: Fault,
+    },
+    /// The step failed with every shorter length that was tried.
     #[error("{source}; the {}", tried(*.cuts))]
     Cut {
+        /// Number of repetitions.
         cuts: u32,
+        /// Error of the last repetition.
         #[source]
         source: Box<SimError>,
     },
 }
 
-/// What was tried before a run was given up.
+/// Describes the repetitions of a step before the run ended.
 fn tried(cuts: u32) -> String {
-    format!("step was taken again {cuts} times, ever shorter, and failed each time")
+    format!("step was repeated {cuts} times, each time shorter, and failed every time")
 }
 
 impl SimError {
-    /// The field went to infinity or not-a-number.
+    /// Whether a value became infinite or not a number.
     pub fn is_non_finite(&self) -> bool {
         match self {
             SimError::Solve { source: SolveError::NonFinite { .. }, .. } => true,
@@ -44,7 +78,7 @@ impl SimError {
         }
     }
 
-    /// What the user can do about it.
+    /// What the user can do about the error.
     pub fn remedy(&self) -> &'static str {
         match self {
             SimError::Unfilled(_) => "see the message",
@@ -61,7 +95,7 @@ impl SimError {
             }
             SimError::Solve { source: SolveError::NonFinite { .. }, .. } => {
                 "likely cause: an expression that is undefined at some particle, or a contrast \
-                 beyond what double precision carries"
+                 beyond double precision"
             }
             SimError::Step { .. } => {
                 "likely cause: a speed that grows without bound; look at the last frames, and \

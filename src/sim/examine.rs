@@ -1,26 +1,27 @@
-//! Looking for what cannot be in the state of a run.
+//! This module checks the state of a run for invalid values.
 
 use super::fault::{Fault, Place};
 use super::simulation::Simulation;
 use crate::space::mesh::Mesh;
 
-/// Powers that differ by this share of the larger are no solution: solutions at the usual
-/// tolerance balance to 1e-9.
+/// Largest relative difference of the powers in a valid solution; at the usual tolerance it is
+/// 1e-9.
 const POWER: f64 = 1e-3;
-/// Solutions asked for with a loose tolerance may miss it this many times.
+/// The difference of the powers may exceed the solver tolerance by this factor, if that is larger.
 const POWER_TOLERANCE: f64 = 10.0;
-/// The projected area of a material never strays this far from its volume: coarse meshes come to
+/// Largest relative drift of the projected area of a material in a valid state; coarse meshes reach
 /// 0.05 (`grainscope stress`).
 const DRIFT: f64 = 0.2;
-/// Materials that fill fewer cells have rims instead of an inside, and drift as they like.
+/// The drift of materials that fill fewer cells is not checked: most of their cells are cut.
 const CELLS_THAT_DRIFT: f64 = 16.0;
 
-/// Numbers beyond this have no finite square, and norms are sums of squares.
+/// Bound of valid values. Squares of much larger values are infinite, and norms are sums of
+/// squares.
 const LARGEST: f64 = 1e150;
 
-/// The first number that is not finite, or whose square is not, and its index.
+/// Index and value of the first number that is not finite or not below [`LARGEST`].
 fn first_bad(values: &[f64]) -> Option<(usize, f64)> {
-    /// Numbers that are looked at together.
+    /// Number of values that are checked together.
     const TOGETHER: usize = 256;
     let good = |v: f64| v.abs() < LARGEST;
     let all_good = |part: &[f64]| part.iter().fold(true, |all, &v| all & good(v));
@@ -30,13 +31,17 @@ fn first_bad(values: &[f64]) -> Option<(usize, f64)> {
     Some((first + bad, values[first + bad]))
 }
 
+/// Whether a point is in the domain.
 fn inside(mesh: &Mesh, p: [f64; 2]) -> bool {
     let within = |v: f64, axis: &crate::space::mesh::Axis| v >= axis.start() && v <= axis.end();
     within(p[0], &mesh.x) && within(p[1], &mesh.y)
 }
 
 impl<const D: usize> Simulation<D> {
-    /// The first thing that cannot be: numbers of loads and flow, of particles, of the row.
+    /// Checks the loads and the flow, then the particles, then the row.
+    ///
+    /// # Errors
+    /// The first fault.
     pub(super) fn find_fault(&self) -> Result<(), Fault> {
         self.faults_of_flow()?;
         self.faults_of_particles()?;

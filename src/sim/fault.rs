@@ -1,78 +1,130 @@
-//! What may be wrong with a state, and where.
+//! This module holds the faults that a state may have, and their positions.
 
-/// Something that cannot be.
+/// A fault of a state.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
+    /// A value is not finite, or its square is not.
     #[error("{field} is {value:e}, {}, {place}", excess(*.value))]
-    NonFinite { field: &'static str, value: f64, place: Place },
-    #[error("{field} is {value:e}, which must be above zero, {place}")]
-    NotPositive { field: &'static str, value: f64, place: Place },
+    NonFinite {
+        /// Name of the quantity.
+        field: &'static str,
+        /// The value.
+        value: f64,
+        /// Position of the value.
+        place: Place,
+    },
+    /// A value that must be positive is not.
+    #[error("{field} is {value:e} and must be above zero, {place}")]
+    NotPositive {
+        /// Name of the quantity.
+        field: &'static str,
+        /// The value.
+        value: f64,
+        /// Position of the value.
+        place: Place,
+    },
+    /// A particle is outside the domain.
     #[error("a particle is outside the domain, {place}")]
-    Outside { place: Place },
+    Outside {
+        /// The particle.
+        place: Place,
+    },
+    /// The power of the loads differs from the dissipation.
     #[error(
-        "the powers of loads and of dissipation differ by {error:.1e} of the larger, \
+        "the power of the loads and the dissipation differ by {error:.1e} of the larger one, \
          more than {limit:.1e}"
     )]
-    Power { error: f64, limit: f64 },
+    Power {
+        /// Relative difference.
+        error: f64,
+        /// Largest valid difference.
+        limit: f64,
+    },
+    /// The projected area of a material has changed too much.
     #[error(
-        "the area of `{material}` differs from its volume by {drift:.1e} more than at the start, \
-         beyond {limit:.1e}"
+        "the area of `{material}` relative to its volume has changed by {drift:.1e} since the \
+         start, more than {limit:.1e}"
     )]
-    Drift { material: String, drift: f64, limit: f64 },
-    #[error("the volume of all particles changed by {change:.1e} of itself in one step")]
-    Volume { change: f64 },
+    Drift {
+        /// Name of the material.
+        material: String,
+        /// Relative change since the start.
+        drift: f64,
+        /// Largest valid change.
+        limit: f64,
+    },
+    /// The total volume of the particles is not conserved.
+    #[error("the total volume of the particles changed by a relative {change:.1e} in one step")]
+    Volume {
+        /// Relative change in the step.
+        change: f64,
+    },
 }
 
-/// Where something is wrong; SI coordinates.
+/// Position of a fault, in SI coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place {
+    /// At a particle.
     Particle {
+        /// Index of the particle.
         index: usize,
+        /// Index of its cell.
         cell: usize,
+        /// Coordinate x, m.
         x: f64,
+        /// Coordinate y, m.
         y: f64,
     },
+    /// At a node.
     Node {
+        /// Index of a cell at the node.
         cell: usize,
+        /// Coordinate x, m.
         x: f64,
+        /// Coordinate y, m.
         y: f64,
     },
+    /// In a cell.
     Cell {
+        /// Index of the cell.
         cell: usize,
+        /// Coordinate x of the centre, m.
         x: f64,
+        /// Coordinate y of the centre, m.
         y: f64,
     },
-    /// A number of the whole scene.
+    /// In a value of the whole scene.
     Scene,
 }
 
 impl Fault {
+    /// Whether a value is not finite, or its square is not.
     pub fn is_non_finite(&self) -> bool {
         matches!(self, Fault::NonFinite { .. })
     }
 
-    /// The state is inaccurate, but one that steps can go on from.
+    /// Whether the state is only inaccurate, so that the run can continue from it.
     pub fn is_tolerable(&self) -> bool {
         matches!(self, Fault::Power { .. } | Fault::Drift { .. } | Fault::Volume { .. })
     }
 
-    /// Likely cause, and what the user can do about it.
+    /// Likely cause of the fault, and what the user can do about it.
     pub fn remedy(&self) -> &'static str {
         match self {
             Fault::NonFinite { .. } => {
                 "likely cause: an expression or a scheduled change that has no finite value there, \
-                 or a contrast beyond what double precision carries; correct the expression, or \
+                 or a contrast beyond double precision; correct the expression, or \
                  lower the contrast"
             }
             Fault::NotPositive { .. } | Fault::Volume { .. } => {
-                "likely cause: a step too long for a material whose volume or viscosity follows \
-                 the flow; lower time.courant, or raise accuracy.particles_per_cell"
+                "likely cause: a time step too long for a material whose volume or viscosity \
+                 follows the flow; lower time.courant, or raise accuracy.particles_per_cell"
             }
             Fault::Outside { .. } => {
                 "likely cause: a step much longer than a cell near a wall; lower time.courant"
             }
             Fault::Power { .. } => {
-                "likely cause: a contrast beyond what the solver balances; lower \
+                "likely cause: a contrast that is too large for the solver; lower \
                  accuracy.tolerance, raise accuracy.max_corrections, or lower the contrast"
             }
             Fault::Drift { .. } => {
@@ -98,6 +150,7 @@ impl std::fmt::Display for Place {
     }
 }
 
+/// Describes why a value is invalid.
 fn excess(value: f64) -> &'static str {
     if value.is_finite() { "whose square is not finite" } else { "which is not finite" }
 }

@@ -1,44 +1,47 @@
-//! Every step is examined before anybody sees its result.
+//! This module checks the state after every step before it is used or written.
 //!
-//! A step that fails, or leads to a state that cannot be, is undone: the run goes back to the last
-//! good state and, by the default policy, tries again with a shorter step. What is given up after
-//! that stands at its last good state, so that it can be looked at, saved and resumed.
+//! A step that fails or leads to an invalid state is undone: the run returns to the last valid
+//! state and, with the default policy, repeats the step with a shorter length. If that fails too,
+//! the run ends at its last valid state, which can be inspected, saved and resumed.
 
 use super::state::State;
 use super::{Fault, Run, SimError};
 use crate::solve::report::SolveError;
 
-/// What to do about a step that fails.
+/// What to do when a step fails.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Policy {
-    /// End the run at its last good state.
+    /// End the run at its last valid state.
     Stop,
-    /// Take the step again, shorter, a few times; then end the run.
+    /// Repeat the step a few times with a shorter time step; then end the run.
     #[default]
     CutStep,
-    /// As `CutStep`, but go on, with a note, where a state is inaccurate rather than impossible.
+    /// As `CutStep`, but continue with a note if the state is inaccurate rather than impossible.
     Continue,
 }
 
-/// How often a step is halved: sixteen steps instead of one.
+/// Largest number of times that a step is halved, which gives 1/16 of its length.
 const MOST_CUTS: u32 = 4;
 
-/// Particles split, merge and move, but their volumes add up to this share.
+/// Largest relative change of the total particle volume in a step, by splits, merges and advection.
 const VOLUME: f64 = 1e-9;
 
-/// Takes the steps of a run.
+/// Takes the steps of a run and keeps its last valid state.
 pub struct Guard {
     policy: Policy,
     good: State,
 }
 
 impl Guard {
-    /// Of a run that stands at a good state.
+    /// A guard of a run that is at a valid state.
     pub fn new(policy: Policy, run: &dyn Run) -> Guard {
         Guard { policy, good: run.state() }
     }
 
-    /// Examines the first instant.
+    /// Checks the initial state.
+    ///
+    /// # Errors
+    /// The state has a fault that is not tolerable.
     pub fn begin(&self, run: &dyn Run) -> Result<(), SimError> {
         let (step, time) = (run.row().step, run.row().time);
         match run.examine() {
@@ -47,13 +50,15 @@ impl Guard {
         }
     }
 
-    /// The last state that was found good.
+    /// The last valid state.
     pub fn good(&self) -> &State {
         &self.good
     }
 
-    /// Takes a step; what there is to be noted about it. After an error the run stands at its last
-    /// good state.
+    /// Takes a step and returns notes about faults and repetitions.
+    ///
+    /// # Errors
+    /// The step failed and could not be repaired. The run is then at its last valid state.
     pub fn step(&mut self, run: &mut dyn Run) -> Result<Vec<String>, SimError> {
         let mut notes = Vec::new();
         let mut cuts = 0;
@@ -64,7 +69,7 @@ impl Guard {
                 Err(SimError::Fault { step, fault, .. })
                     if self.policy == Policy::Continue && fault.is_tolerable() =>
                 {
-                    notes.push(format!("step {step}: {fault}; going on all the same"));
+                    notes.push(format!("step {step}: {fault}; the run continues"));
                     break Ok(());
                 }
                 Err(error) => error,
@@ -77,7 +82,7 @@ impl Guard {
                 break Err(SimError::Cut { cuts, source: Box::new(error) });
             }
             cuts += 1;
-            notes.push(format!("{error}; taken again with half the step, {shorter:.3e} s"));
+            notes.push(format!("{error}; repeated with half the time step, {shorter:.3e} s"));
             run.limit_step(Some(shorter));
         };
         run.limit_step(None);
@@ -87,10 +92,12 @@ impl Guard {
     }
 }
 
-/// What is conserved from one step to the next.
+/// The conserved volume of a state.
 #[derive(Clone, Copy)]
 struct Volume {
+    /// Total volume of the particles, in the plan's units.
     volume: f64,
+    /// Number of particles that have left the domain.
     left: u64,
 }
 
@@ -99,7 +106,7 @@ impl Volume {
         Volume { volume: run.particles().volume.iter().sum(), left: run.count().left }
     }
 
-    /// Volumes follow the flow in compressible scenes, and particles may leave.
+    /// Checks that the volume is conserved, unless particles left or the scene is compressible.
     fn check(self, run: &dyn Run) -> Result<(), Fault> {
         let now = Volume::of(run);
         let change = (now.volume / self.volume - 1.0).abs();
@@ -110,11 +117,11 @@ impl Volume {
     }
 }
 
-/// Takes a step and examines where it leads.
+/// Takes a step and checks the new state.
 fn attempt(run: &mut dyn Run, before: Volume) -> Result<(), SimError> {
     match run.step() {
         Ok(()) => {}
-        // Where, if the state tells.
+        // The fault of the state tells where the value is.
         Err(SimError::Solve { step, time, source: source @ SolveError::NonFinite { .. } }) => {
             return Err(match run.examine() {
                 Err(fault) if fault.is_non_finite() => SimError::Fault { step, time, fault },
@@ -141,7 +148,7 @@ mod tests {
     use crate::{plan, scene, sim};
     use std::sync::Arc;
 
-    /// What goes wrong in steps that are longer than they may be.
+    /// Kind of failure of steps that are too long.
     #[derive(Clone, Copy, PartialEq)]
     enum Wrong {
         Failing,
@@ -149,12 +156,13 @@ mod tests {
         Inaccurate,
     }
 
-    /// A run whose third step goes wrong if it is long.
+    /// A run whose third step fails if it is too long.
     struct Fragile {
         run: Box<dyn Run>,
         wrong: Wrong,
-        /// As a share of the step that would be taken, which is learnt from the first try.
+        /// Largest valid step over `usual`.
         share: f64,
+        /// Length of the first attempt of the third step, s.
         usual: f64,
     }
 
@@ -257,7 +265,7 @@ mod tests {
         }
     }
 
-    /// The third step of a run that goes wrong there.
+    /// Takes two valid steps and the third, which fails.
     fn third(policy: Policy, run: &mut Fragile) -> Result<Vec<String>, SimError> {
         let mut guard = Guard::new(policy, run);
         for _ in 0..2 {
@@ -275,7 +283,7 @@ mod tests {
             assert_eq!(run.row().step, 3);
             assert_eq!(run.row().dt_limiter, sim::clock::Limiter::Guard);
             assert!((run.attempted_step() / run.usual - 0.25).abs() < 1e-12);
-            // It is the step that this run would have taken had it known.
+            // The state is that of a run that takes the short step at once.
             let mut other = Fragile::new(wrong, 2.0);
             for _ in 0..2 {
                 other.step().expect("a good step");
@@ -294,7 +302,7 @@ mod tests {
             before.step().and_then(|()| before.step()).expect("two good steps");
             let error = third(policy, &mut run).expect_err("no way on");
             assert!(error.is_non_finite(), "{error}");
-            assert_eq!(error.to_string().contains("taken again"), told > 0, "{error}");
+            assert_eq!(error.to_string().contains("repeated"), told > 0, "{error}");
             assert_eq!((run.row().step, run.state_hash()), (2, before.state_hash()));
         }
     }
@@ -304,7 +312,7 @@ mod tests {
         let mut run = Fragile::new(Wrong::Inaccurate, 0.0);
         let notes = third(Policy::Continue, &mut run).expect("tolerated");
         assert_eq!(run.row().step, 3);
-        assert!(notes.len() == 1 && notes[0].contains("going on all the same"), "{notes:?}");
+        assert!(notes.len() == 1 && notes[0].contains("the run continues"), "{notes:?}");
         assert!(third(Policy::Stop, &mut Fragile::new(Wrong::Inaccurate, 0.0)).is_err());
     }
 }

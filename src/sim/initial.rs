@@ -1,10 +1,10 @@
-//! The particles at the start: material, volume, directors and carried fields from the plan's
-//! regions.
+//! This module creates the initial particles: their material, volume, directors and carried fields
+//! follow from the regions of the plan.
 //!
-//! In a cell that regions divide, the particles of each material stand for exactly its part: their
+//! In a cell that regions divide, the particles of each material represent its part exactly: their
 //! volumes add up to its area, and they are shifted (by less than their spacing) so that their
-//! centroid is its centroid: at the start a level has no noise of the particles' places. A part
-//! that no particle happens to lie in gets one of its own.
+//! centroid is its centroid. An initial interface therefore has no noise from the particle
+//! positions. A part that contains no particle gets one.
 
 use super::sampling::{Filling, Sample, filling, samples};
 use crate::plan::{InitialDirector, Mark, Plan};
@@ -14,23 +14,28 @@ use crate::space::population::{Count, Population};
 use rand::Rng;
 use rand_pcg::Pcg64;
 
-/// Parts of a cell below this share are left to its other materials.
+/// Smaller fractions of a cell are given to its other materials.
 const LEAST_SHARE: f64 = 1e-8;
-/// Shifted particles stay this far inside their cell, in half cells.
+/// Smallest distance of shifted particles from the sides of their cell, in half cells.
 const INSET: f64 = 1e-3;
 
-/// A point of the domain that no region and no background fills.
+/// Error: a point of the domain lies in no region, and there is no background material.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "nothing fills the scene at x = {x:.6e}, y = {y:.6e}: a flow without inertia needs a material \
      everywhere; extend a region, or give a material `background = true`"
 )]
 pub struct Unfilled {
+    /// Coordinate x, m.
     pub x: f64,
+    /// Coordinate y, m.
     pub y: f64,
 }
 
-/// Fills every cell; sorted.
+/// The initial particles of a plan, sorted by cell.
+///
+/// # Errors
+/// A particle lies in no region, and there is no background material.
 pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
     let effects = &plan.effects;
     let mut out = Particles {
@@ -47,7 +52,7 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let places = &places.position[places.of_cell(cell)];
         let mut random = plan.method.seeding.random(cell);
-        // The random numbers of the places come first.
+        // Skip the random numbers of the positions.
         plan.method.seeding.positions(mesh, cell, &mut random);
         members.clear();
         for &position in places {
@@ -87,7 +92,8 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
     Ok(out)
 }
 
-/// Where particles start, all cells within the bounds of the population; sorted.
+/// Initial positions of the particles, sorted by cell; the number in each cell is within its
+/// bounds.
 fn places(plan: &Plan) -> Particles {
     let mesh = &plan.mesh;
     let mut out = Particles::default();
@@ -106,12 +112,12 @@ fn places(plan: &Plan) -> Particles {
     out
 }
 
-/// A particle in the making.
+/// A particle before its fields are set.
 #[derive(Clone, Copy)]
 struct Member {
     /// Reference coordinates.
     r: [f64; 2],
-    /// Of the cell's area.
+    /// Fraction of the cell's area.
     share: f64,
     material: u8,
     filling: Filling,
@@ -121,10 +127,10 @@ fn material(plan: &Plan, filling: Filling) -> Option<u8> {
     filling.map(|f| plan.regions[f].material).or(plan.background())
 }
 
-/// Lets the particles of each material stand for its part of a cell.
+/// Sets volumes and positions so that the particles of each material represent its part of a cell.
 fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member>) {
     let materials = plan.state.materials.len();
-    // Share and first moments of each material.
+    // Area fraction and first moments of each material.
     let mut parts = vec![[0.0; 3]; materials];
     for s in samples {
         if let Some(m) = material(plan, s.filling) {
@@ -135,7 +141,7 @@ fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member
         }
     }
     let total: f64 = parts.iter().map(|p| p[0]).filter(|&s| s > LEAST_SHARE).sum();
-    // One region, or particles where the lines saw nothing: equal shares.
+    // With one region, or with a particle in a part that the lines missed, all shares stay equal.
     let unseen = |m: &Member| parts[m.material as usize][0] <= LEAST_SHARE;
     if total == 0.0 || members.iter().any(unseen) {
         return;
@@ -153,7 +159,7 @@ fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member
         own.iter_mut().for_each(|p| p.share = share / count);
         for c in 0..2 {
             let mean = own.iter().map(|p| p.r[c]).sum::<f64>() / count;
-            // Drawn together where the shift alone would take some out of the cell.
+            // Contract the particles if the shift alone would move some out of the cell.
             let edge = centroid[c].abs().max(1.0 - INSET);
             let room = |p: &&mut Member| {
                 let from_mean = p.r[c] - mean;
@@ -165,7 +171,8 @@ fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member
     }
 }
 
-/// The only particle of a material's part: where the part is nearest to its centroid.
+/// The only particle of a material's part, at the centroid of the part if it lies in the part,
+/// otherwise at the sample nearest to the centroid.
 fn lone(
     plan: &Plan,
     cell: usize,
@@ -182,7 +189,7 @@ fn lone(
     Some(Member { r, share, material: m, filling: nearest.filling })
 }
 
-/// Viscosities and densities that the particles of a cell carry.
+/// Sets the viscosities and densities that the particles of a cell carry.
 fn carry(plan: &Plan, cell: usize, members: &[Member], (out, first): (&mut Particles, usize)) {
     for (m, fields) in plan.initial.iter().enumerate() {
         let of_m = || (0..members.len()).filter(|&k| members[k].material as usize == m);
@@ -204,9 +211,9 @@ fn carry(plan: &Plan, cell: usize, members: &[Member], (out, first): (&mut Parti
 }
 
 /// Angles spread evenly over `[-pi/2, pi/2)` in random order: `n` equal steps with an offset from
-/// a two-dimensional low-discrepancy sequence (Roberts 2018) over the cells, so that neighbouring
-/// cells fill each other's gaps. Each angle is uniformly distributed; means over few cells have
-/// far less noise than independent angles would give.
+/// a two-dimensional low-discrepancy sequence (Roberts 2018) over the cells, so that the
+/// angles of neighbouring cells interleave. Each angle is uniformly distributed. Means over few
+/// cells have far less noise than those of independent angles.
 fn spread_angles(n: usize, [i, j]: [usize; 2], start: f64, random: &mut Pcg64) -> Vec<f64> {
     use std::f64::consts::{FRAC_PI_2, PI};
     const PLASTIC: f64 = 1.324_717_957_244_746;
@@ -219,6 +226,7 @@ fn spread_angles(n: usize, [i, j]: [usize; 2], start: f64, random: &mut Pcg64) -
     angles
 }
 
+/// Whether a point lies within the half width of a mark.
 fn is_near(mark: &Mark, p: [f64; 2]) -> bool {
     let d = [mark.to[0] - mark.from[0], mark.to[1] - mark.from[1]];
     let length2 = d[0] * d[0] + d[1] * d[1];

@@ -1,4 +1,4 @@
-//! Diagnostics of a state.
+//! This module computes the diagnostics of a state.
 
 use super::clock::{Limiter, Speeds};
 use super::phases::Phases;
@@ -11,7 +11,7 @@ use crate::threads;
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
-/// SHA-256 over the bits of everything particles carry.
+/// SHA-256 hash of the bits of all particle data, in hexadecimal.
 pub fn hash(p: &Particles) -> String {
     let mut h = Sha256::new();
     let mut floats = |values: &mut dyn Iterator<Item = f64>| {
@@ -29,7 +29,7 @@ pub fn hash(p: &Particles) -> String {
 }
 
 impl<const D: usize> Simulation<D> {
-    /// What limits the next step.
+    /// Quantities that limit the next step.
     pub(super) fn speeds(&self) -> Speeds {
         let mesh = &self.plan.mesh;
         let centre = Shape::at([0.0; 2]);
@@ -56,7 +56,7 @@ impl<const D: usize> Simulation<D> {
         speeds
     }
 
-    /// Largest number of cells crossed per unit time with these velocities of the nodes.
+    /// Largest number of cells crossed per unit time with given nodal velocities.
     pub(super) fn crossings(&self, velocity: impl Fn(usize) -> [f64; 2]) -> f64 {
         let crossed = |(node, rate): (usize, &[f64; 2])| {
             let u = velocity(node);
@@ -72,7 +72,7 @@ impl<const D: usize> Simulation<D> {
         if volume > 0.0 { area / volume } else { 0.0 }
     }
 
-    /// Of the particles in gravity, less what the background would have in their place.
+    /// Potential energy of the particles relative to the background material, in the plan's units.
     pub(super) fn potential_energy(&self) -> f64 {
         let p = &self.particles;
         let ground =
@@ -90,7 +90,7 @@ impl<const D: usize> Simulation<D> {
         energy
     }
 
-    /// Power of everything but gravity.
+    /// Power of all loads except gravity, in the plan's units.
     fn other_power(&self) -> f64 {
         let weight: f64 = if self.plan.effects.gravity {
             self.load
@@ -105,6 +105,7 @@ impl<const D: usize> Simulation<D> {
         self.report.power_in - weight
     }
 
+    /// See [`Row::volume_error`].
     fn volume_error(&self) -> f64 {
         let mesh = &self.plan.mesh;
         let [sum, cells] = threads::sum(0..mesh.cells(), |cell| {
@@ -118,7 +119,8 @@ impl<const D: usize> Simulation<D> {
         (sum / cells.max(1.0)).sqrt()
     }
 
-    /// Writes the row of the current state, reached by a step of `dt` that began at `clock`.
+    /// Computes the row of the current state, after a step of length `dt` whose computation began
+    /// at `clock`.
     pub(super) fn measure(
         &mut self,
         dt: f64,
@@ -141,7 +143,7 @@ impl<const D: usize> Simulation<D> {
         };
         let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
         let work = trapezoid(before.work, self.last_other_power, other);
-        // In the room of the row before.
+        // The lists of the previous row are reused.
         let mut drift = std::mem::take(&mut self.row.drift);
         drift.clear();
         drift.extend(self.baseline.iter().enumerate().map(|(m, &start)| {

@@ -1,13 +1,13 @@
-//! One run: the algorithm of a step, start to end.
+//! This module simulates one run. A step consists of these parts:
 //!
 //! ```text
-//! choose dt                    named limiters
-//! velocity of the half step    extrapolated from two solutions, or solved for
-//! move particles, dye          Runge-Kutta in the frozen field; walls hold, gauges count
-//! turn directors               exact map of the step's velocity gradient
-//! control the population       no cell empty or overfull
-//! integration points           what each cell's particles say: shares, interface, fields
-//! weight, restoring loads      density of each cell; stable strata ahead of time
+//! choose dt                    the smallest of several named limits
+//! half-step velocity           extrapolated from two solutions, or solved for
+//! advect particles, dye        Runge-Kutta in the frozen field, with walls and gauges
+//! rotate directors             exact solution for the velocity gradient of the step
+//! resample particles           keeps the number of particles per cell within bounds
+//! integration points           fractions, interface and fields from the particles of each cell
+//! weight, restoring loads      density of each cell; implicit terms for stable stratification
 //! solve                        velocity, rotation, pressure
 //! ```
 
@@ -44,7 +44,10 @@ use row::Row;
 use state::{State, StateError};
 use std::sync::Arc;
 
-/// Sets a plan up and solves its first instant.
+/// Starts the run of a plan and solves for the initial flow.
+///
+/// # Errors
+/// A part of the scene has no material, or the initial flow cannot be solved for.
 pub fn start(plan: Arc<Plan>) -> Result<Box<dyn Run>, SimError> {
     if plan.effects.rotation {
         Ok(Box::new(Simulation::<3>::new(plan)?))

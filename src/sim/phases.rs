@@ -1,19 +1,19 @@
-//! Wall seconds of a step by phase.
+//! This module holds the wall time of a step by phase.
 
 use serde::Serialize;
 
-/// Wall seconds by phase.
+/// Wall time by phase, s.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Phases {
-    /// Integration points.
+    /// Computation of integration points.
     pub quadrature: f64,
     /// Gravity, accelerations and the restoring loads of stratification.
     pub weight: f64,
-    /// Element matrices.
+    /// Assembly of element matrices.
     pub assemble: f64,
     /// Factorisation.
     pub factor: f64,
-    /// Corrections.
+    /// Solver corrections.
     pub solve: f64,
     /// Advection of particles and directors.
     pub motion: f64,
@@ -21,12 +21,12 @@ pub struct Phases {
     pub dye: f64,
     /// Splits and merges of particles.
     pub population: f64,
-    /// The row of the series.
+    /// Computation of the row of the series.
     pub diagnostics: f64,
 }
 
 impl Phases {
-    /// Adds the seconds of another step.
+    /// Adds the times of another step.
     pub fn add(&mut self, o: &Phases) {
         self.quadrature += o.quadrature;
         self.weight += o.weight;
@@ -39,7 +39,7 @@ impl Phases {
         self.diagnostics += o.diagnostics;
     }
 
-    /// All phases by name.
+    /// Name and time of each phase, s.
     pub fn list(&self) -> [(&'static str, f64); 9] {
         [
             ("quadrature", self.quadrature),
@@ -54,7 +54,7 @@ impl Phases {
         ]
     }
 
-    /// Seconds of all phases together.
+    /// Sum over all phases, s.
     pub fn total(&self) -> f64 {
         self.list().iter().map(|(_, s)| s).sum()
     }

@@ -1,7 +1,8 @@
-//! The diagnostics of a step, in SI units: a row of `series.csv`, and the registry of its columns.
+//! This module holds the diagnostics of a step in SI units, which are a row of `series.csv`, and
+//! the registry of its columns.
 //!
-//! An entry of `columns!` is all that a column needs: its name, unit and place in tables, plots,
-//! recordings and comparisons, and the expression that computes it. Everything else that knows
+//! A column is defined by one entry of `columns!`: its name, its unit, its use in tables, plots,
+//! recordings and comparisons, and the expression that computes it. All other code that uses
 //! columns (`record`, `compare`, `sweep`, `explorer`, the state of a run) reads [`COLUMNS`],
 //! [`PER_GAUGE`] and [`PER_MATERIAL`].
 
@@ -21,51 +22,51 @@ pub struct Column {
     pub name: &'static str,
     /// Symbol in formulas; empty if it has none.
     pub symbol: &'static str,
-    /// SI unit; empty for pure numbers.
+    /// SI unit; empty for dimensionless values.
     pub unit: &'static str,
     /// Name on axes and in legends.
     pub label: &'static str,
-    /// What it is and where it comes from.
+    /// Description of the value.
     pub meaning: &'static str,
-    /// Entity path in recordings below the run's own; empty if it is not recorded.
+    /// Entity path in recordings, below the path of the run; empty if the column is not recorded.
     pub path: &'static str,
-    /// Place in comparisons: low ranks come first.
+    /// Role in comparisons; low ranks come first.
     pub rank: Rank,
-    /// Panel of the recording in which its curve is drawn.
+    /// Panel of the recording that shows the curve.
     pub panel: Option<Panel>,
     /// Whether the explorer's page receives it.
     pub live: bool,
-    /// Whether a plan's series has it.
+    /// Whether the series of a plan has the column.
     pub exists: fn(&Plan) -> bool,
     format: Format,
     access: Access,
 }
 
-/// How a column takes part in comparisons.
+/// Role of a column in comparisons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rank {
-    /// Values and curves are compared; this is its place among them.
+    /// Values and curves are compared, in the order of this rank.
     Compared(u8),
-    /// Values are compared, curves are not: an error or a count.
+    /// Only values are compared, in the order of this rank: an error or a count.
     Value(u8),
-    /// It says nothing about the flow and is left out.
+    /// The column does not describe the flow and is not compared.
     Never,
 }
 
 /// A panel of curves in recordings, in the order of display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Panel {
-    /// Volumes that crossed the gauges.
+    /// Volumes that have crossed the gauges.
     OutflowVolume,
-    /// Rates at the gauges.
+    /// Fluxes across the gauges.
     OutflowRate,
     /// Mean alignment of directors.
     Alignment,
-    /// Powers; only where there is no gauge.
+    /// Powers; only for scenes without gauges.
     Power,
     /// Errors of the balances.
     Balances,
-    /// Wall seconds by phase.
+    /// Wall time by phase.
     Seconds,
     /// The time step.
     TimeStep,
@@ -83,7 +84,7 @@ impl Panel {
         Panel::TimeStep,
     ];
 
-    /// Heading, and whether the axis is logarithmic.
+    /// Heading of the panel, and whether its axis is logarithmic.
     pub fn heading(self) -> (&'static str, bool) {
         match self {
             Panel::OutflowVolume => ("Outflow volume (m²)", false),
@@ -97,25 +98,31 @@ impl Panel {
     }
 }
 
-/// How numbers are written.
+/// Format of numbers in the table.
 #[derive(Clone, Copy, Debug)]
 enum Format {
+    /// Shortest decimal form.
     Plain,
+    /// Shortest form with an exponent.
     Exponent,
+    /// Six decimals.
     Microseconds,
 }
 
-/// Reads and writes a row's value; the index is the gauge's or the material's.
+/// Functions that read and write a value of a row. The index is that of the gauge or material.
 #[derive(Clone, Copy, Debug)]
 struct Access {
+    /// The value as a number.
     number: fn(&Row, usize) -> f64,
+    /// The value as text.
     text: fn(&Row, usize, Format) -> String,
+    /// Parses a value and stores it in the row.
     set: fn(&mut Row, usize, &str) -> Result<(), &'static str>,
 }
 
-/// A type of values.
+/// A type of column values.
 trait Value: Sized {
-    /// What a text that cannot be read is not.
+    /// Name of the type in the error for text that cannot be parsed.
     const KIND: &'static str;
     fn number(&self) -> f64;
     fn text(&self, format: Format) -> String;
@@ -183,34 +190,35 @@ macro_rules! counts {
 }
 counts!(u64 u32 usize);
 
+/// Parses a value and stores it. The error is the name of the expected type.
 fn put<T: Value>(place: &mut T, text: &str) -> Result<(), &'static str> {
     *place = T::parse(text).ok_or(T::KIND)?;
     Ok(())
 }
 
-/// What a column may be computed from.
+/// Values from which columns are computed.
 pub struct Measured<'a> {
     /// The plan of the run.
     pub plan: &'a Plan,
-    /// Its units.
+    /// Units of the plan.
     pub units: &'a Units,
-    /// Materials as they are now.
+    /// Current materials.
     pub materials: &'a [Material],
-    /// Particles as they are now.
+    /// Current particles.
     pub particles: &'a Particles,
-    /// How the last solution went.
+    /// Report of the last solution.
     pub report: &'a Report,
-    /// Events of the population since the start.
+    /// Particle events since the start.
     pub count: Count,
     /// Number of the step.
     pub step: u64,
-    /// s
+    /// Simulated time, s.
     pub time: f64,
-    /// s
+    /// Length of the step, s.
     pub dt: f64,
-    /// What set the step.
+    /// The limit that determined the length of the step.
     pub limiter: Limiter,
-    /// Corrections of all solutions of the step.
+    /// Number of solver corrections, summed over the solutions of the step.
     pub iterations: u32,
     /// Largest speed, m/s.
     pub max_speed: f64,
@@ -218,11 +226,11 @@ pub struct Measured<'a> {
     pub rms_speed: f64,
     /// See [`Row::volume_error`].
     pub volume_error: f64,
-    /// J/m
+    /// See [`Row::potential_energy`], J/m.
     pub potential_energy: f64,
-    /// J/m
+    /// See [`Row::work`], J/m.
     pub work: f64,
-    /// J/m
+    /// See [`Row::dissipated`], J/m.
     pub dissipated: f64,
 }
 
@@ -235,17 +243,17 @@ macro_rules! columns {
         #[derive(Clone, Debug)]
         pub struct Row {
             $( $(#[doc = $doc])+ pub $field: $type, )*
-            /// State of each gauge.
+            /// Values of each gauge.
             pub gauges: Vec<GaugeRow>,
-            /// Relative change since the start of each material's projected area over the volume
-            /// of its particles, which is exact.
+            /// Relative change since the start of the projected area of each material over the
+            /// volume of its particles, which is exact.
             pub drift: Vec<f64>,
-            /// Wall seconds by phase.
+            /// Wall time by phase, s.
             pub seconds: Phases,
         }
 
         impl Row {
-            /// The row before anything is known.
+            /// An empty row for a number of materials.
             pub fn empty(materials: usize) -> Row {
                 Row {
                     $( $field: $empty, )*
@@ -266,7 +274,7 @@ macro_rules! columns {
             }
         }
 
-        /// The columns that are one number of the whole run, in the order of the table.
+        /// Columns with one value for the whole run, in the order of the table.
         pub static COLUMNS: &[Column] = &[
             $( Column {
                 name: stringify!($field),
@@ -292,9 +300,9 @@ columns! {
     dt: f64 = |m| m.dt, 0.0, {
         symbol: "dt", unit: "s", label: "dt", path: "time/dt", panel: Some(Panel::TimeStep), live: true,
     };
-    /// What set the length of the step.
+    /// The limit that determined the length of the step.
     dt_limiter: Limiter = |m| m.limiter, Limiter::Start, { label: "limiter", rank: Rank::Never };
-    /// Wall seconds that the step took.
+    /// Wall time of the step.
     wall: f64 = |_m| 0.0, 0.0, {
         unit: "s", label: "wall seconds", rank: Rank::Never, format: Format::Microseconds,
     };
@@ -313,7 +321,7 @@ columns! {
         label: "power error", format: Format::Exponent, path: "diagnostics/power_error",
         panel: Some(Panel::Balances), live: true,
     };
-    /// L2 norm of the projected divergence over that of the strain rate.
+    /// L2 norm of the projected divergence over the L2 norm of the strain rate.
     divergence_error: f64 = |m| m.report.divergence, 0.0, {
         label: "divergence error", format: Format::Exponent, path: "diagnostics/divergence_error",
         panel: Some(Panel::Balances),
@@ -323,30 +331,30 @@ columns! {
         label: "volume error", format: Format::Exponent, path: "diagnostics/volume_error",
         panel: Some(Panel::Balances), live: true,
     };
-    /// Corrections of the solver, all solutions of the step together.
+    /// Number of solver corrections, summed over the solutions of the step.
     iterations: u32 = |m| m.iterations, 0, { label: "iterations" };
     /// Number of particles.
     particles: usize = |m| m.particles.len(), 0, { label: "particles", rank: Rank::Value(11) };
-    /// Largest speed of a node.
+    /// Largest speed at a node.
     max_speed: f64 = |m| m.max_speed, 0.0, {
         unit: "m/s", label: "largest speed", rank: Rank::Compared(3),
         path: "diagnostics/max_speed", live: true,
     };
-    /// Root mean square speed over the domain without solids.
+    /// Root mean square speed over the domain except solids.
     rms_speed: f64 = |m| m.rms_speed, 0.0, {
         unit: "m/s", label: "rms speed", rank: Rank::Compared(4), path: "diagnostics/rms_speed",
     };
-    /// Power that the stabilisation of stratified fluids takes from the flow: numerical, of second
-    /// order in the step, either sign.
+    /// Power that the stabilisation of stratified fluids takes from the flow: a numerical term of
+    /// second order in the step, with either sign.
     stabilisation: f64 = |m| m.report.restoring * m.units.power(), 0.0, {
         unit: "W/m", label: "stabilisation", format: Format::Exponent,
     };
-    /// Potential energy of the particles in gravity, less what the background would have there.
+    /// Potential energy of the particles in gravity, relative to the background material.
     potential_energy: f64 = |m| m.potential_energy, 0.0, {
         symbol: "E_p", unit: "J/m", label: "potential energy", rank: Rank::Compared(7),
     };
-    /// Time integral of the power of everything but gravity, and what scheduled changes of gravity
-    /// add.
+    /// Time integral of the power of all loads except gravity, plus the change of potential energy
+    /// by scheduled changes.
     work: f64 = |m| m.work, 0.0, {
         symbol: "W", unit: "J/m", label: "work", rank: Rank::Compared(12),
     };
@@ -358,15 +366,15 @@ columns! {
     director_error: f64 = |m| m.particles.director_error(), 0.0, {
         label: "director error", format: Format::Exponent,
     };
-    /// Rotation unknowns that a Cosserat material acts on.
+    /// Number of rotation unknowns on which a Cosserat material acts.
     active_rotation: usize = |m| m.report.active_rotation, 0, {
         label: "active rotation unknowns", rank: Rank::Compared(12),
     };
-    /// Particles split since the start.
+    /// Number of particle splits since the start.
     splits: u64 = |m| m.count.splits, 0, { label: "splits", rank: Rank::Never };
-    /// Particles merged since the start.
+    /// Number of particle merges since the start.
     merges: u64 = |m| m.count.merges, 0, { label: "merges", rank: Rank::Never };
-    /// Particles held back by walls since the start.
+    /// Number of times that a wall stopped a particle since the start.
     held: u64 = |m| m.count.held, 0, { label: "held at walls", rank: Rank::Never };
     /// Volume mean of |n_x| over layered particles; absent without directors.
     mean_alignment: Option<f64> = |m| mean_alignment(m.particles, m.materials), None, {
@@ -375,16 +383,16 @@ columns! {
     };
 }
 
-/// State of a gauge.
+/// Values of a gauge.
 #[derive(Clone, Debug, Serialize)]
 pub struct GaugeRow {
-    /// Net volume that crossed the gauge per unit depth, m2.
+    /// Net volume of the gauge's material that has crossed it per unit depth, m2.
     pub volume: f64,
-    /// Flux across it, m2/s.
+    /// Flux of the gauge's material across it, m2/s.
     pub rate: f64,
 }
 
-/// Columns of every gauge; a prefix tells several gauges apart.
+/// Columns of each gauge. If there are several gauges, the gauge's name is a prefix.
 pub static PER_GAUGE: [Column; 2] = [
     Column {
         name: "outflow_volume",
@@ -422,7 +430,7 @@ pub static PER_GAUGE: [Column; 2] = [
     },
 ];
 
-/// Columns of every material.
+/// Columns of each material.
 pub static PER_MATERIAL: [Column; 1] = [Column {
     name: "volume_drift",
     label: "volume drift",
@@ -439,7 +447,7 @@ pub static PER_MATERIAL: [Column; 1] = [Column {
 }];
 
 impl Column {
-    /// What columns have that say nothing else.
+    /// Default values of the fields.
     const PLAIN: Column = Column {
         name: "",
         symbol: "",
@@ -461,60 +469,62 @@ impl Column {
 }
 
 impl Column {
-    /// The value of a row, for columns of the whole run; NaN where it is no number.
+    /// The value of a row as a number, for columns of the whole run; NaN if it is not a number.
     pub fn number(&self, row: &Row) -> f64 {
         (self.access.number)(row, 0)
     }
 
-    /// Reads a value of the table into a row, for columns of the whole run.
+    /// Parses a value of the table and stores it in a row, for columns of the whole run.
     ///
     /// # Errors
-    /// What the text is not.
+    /// The text cannot be parsed; the error is the name of the expected type.
     pub fn set(&self, row: &mut Row, text: &str) -> Result<(), &'static str> {
         (self.access.set)(row, 0, text)
     }
 }
 
-/// A column of a plan's series.
+/// A column in the series of a plan.
 pub struct Place {
-    /// Name in the table's first line, with the gauge's or the material's.
+    /// Name in the header of the table, with the name of the gauge or material.
     pub name: String,
-    /// Entity path in recordings; empty if it is not recorded.
+    /// Entity path in recordings; empty if the column is not recorded.
     pub path: String,
-    /// Name of its curve among those of its panel.
+    /// Name of the curve in its panel.
     pub curve: String,
     /// Name on the explorer's page.
     pub live_name: String,
-    /// The registry's entry.
+    /// Definition of the column.
     pub column: &'static Column,
+    /// Index of the gauge or material.
     index: usize,
 }
 
 impl Place {
-    /// The value of a row; NaN where it is no number.
+    /// The value of a row as a number; NaN if it is not a number.
     pub fn number(&self, row: &Row) -> f64 {
         (self.column.access.number)(row, self.index)
     }
 
-    /// The value as the table writes it.
+    /// The value of a row as text for the table.
     pub fn text(&self, row: &Row) -> String {
         (self.column.access.text)(row, self.index, self.column.format)
     }
 
-    /// Reads a value of the table into a row, whose lists have their lengths.
+    /// Parses a value of the table and stores it in a row. The lists of the row must have their
+    /// final lengths.
     ///
     /// # Errors
-    /// A sentence with the column's name and what the text is not.
+    /// The text cannot be parsed; the message contains the column's name and the expected type.
     pub fn set(&self, row: &mut Row, text: &str) -> Result<(), String> {
         (self.column.access.set)(row, self.index, text)
-            .map_err(|kind| format!("{}: `{text}` is no {kind}", self.name))
+            .map_err(|kind| format!("{}: `{text}` is not a {kind}", self.name))
     }
 }
 
-/// Columns of gauges come after this one.
+/// The column after which the columns of the gauges follow.
 const BEFORE_GAUGES: &str = "particles";
 
-/// The columns of a plan's series, in the order of the table.
+/// The columns in the series of a plan, in the order of the table.
 pub fn places(plan: &Plan) -> Vec<Place> {
     let mut list = Vec::new();
     for column in COLUMNS.iter().filter(|c| (c.exists)(plan)) {
@@ -558,7 +568,8 @@ pub fn places(plan: &Plan) -> Vec<Place> {
     list
 }
 
-/// The registry's entry of a name of the table, with or without the gauge's or the material's.
+/// The definition of a column by its name in the table, with or without the name of the gauge or
+/// material.
 pub fn find(name: &str) -> Option<&'static Column> {
     let last = name.rsplit('.').next().unwrap_or(name);
     COLUMNS.iter().chain(&PER_GAUGE).chain(&PER_MATERIAL).find(|c| c.name == last)

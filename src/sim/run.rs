@@ -1,4 +1,4 @@
-//! A run as everything outside of this module sees it: SI units, any number of unknowns.
+//! This module holds the interface of a run, in SI units and for any number of unknowns per node.
 
 use super::error::SimError;
 use super::fault::Fault;
@@ -11,53 +11,68 @@ use crate::space::particles::Particles;
 use crate::space::population::Count;
 use std::sync::Arc;
 
-/// A run whose number of unknowns per node was decided by its plan.
+/// A run; its plan determines the number of unknowns per node.
 pub trait Run: Send {
     /// Takes one step.
+    ///
+    /// # Errors
+    /// The step failed; the state may then be invalid until [`Run::restore`].
     fn step(&mut self) -> Result<(), SimError>;
+    /// Whether the end time is reached.
     fn is_finished(&self) -> bool;
     /// Diagnostics of the current state.
     fn row(&self) -> &Row;
+    /// The plan of the run.
     fn plan(&self) -> &Plan;
+    /// The particles, in the plan's units.
     fn particles(&self) -> &Particles;
     /// Velocity and rotation (zero if none is solved), m/s and 1/s, at an SI point.
     fn velocity_at(&self, p: [f64; 2]) -> [f64; 3];
-    /// Pa
+    /// Pressure, Pa, at an SI point.
     fn pressure_at(&self, p: [f64; 2]) -> f64;
-    /// What the recording shows of the current state.
+    /// The snapshot of the current state for the recording.
     fn snapshot(&self) -> crate::frame::Snapshot;
-    /// SHA-256 over the bits of the particle state.
+    /// SHA-256 hash of the bits of the particle data, in hexadecimal.
     fn state_hash(&self) -> String;
-    /// Unknowns of the solver: velocity and rotation, pressure.
+    /// Number of unknowns of the solver: of velocity and rotation, and of pressure.
     fn unknowns(&self) -> [usize; 2];
-    /// What the last factorisation took.
+    /// Work of the last factorisation.
     fn factor_effort(&self) -> Effort;
-    /// Lets the next factorisation compute all of the factor, changed or not: for measurements.
+    /// Makes the next factorisation recompute the whole factor, for measurements.
     fn forget_factor(&mut self);
+    /// Numbers of particle events since the start.
     fn count(&self) -> Count;
-    /// Warnings that arose while running.
+    /// Warnings that arose during the run.
     fn warnings(&self) -> Vec<Warning>;
-    /// What happened in the last step: changes of matter.
+    /// Descriptions of the scheduled changes that were applied in the last step.
     fn events(&self) -> &[String];
-    /// How many of the plan's changes lie behind.
+    /// Number of scheduled changes that were applied so far.
     fn changes_applied(&self) -> usize;
-    /// Goes on with another plan, made by [`Plan::with_change`]: the two share all that lies behind.
+    /// Continues with another plan, made by [`Plan::with_change`]. It must agree with the old plan
+    /// up to the current time.
     fn replan(&mut self, plan: Arc<Plan>);
-    /// Writes everything that the next step depends on, over what a run of the same plan wrote before.
+    /// Saves all quantities on which the next step depends. Columns that a run of the same plan
+    /// saved before are overwritten.
     fn save(&self, state: &mut State);
-    /// The same, on its own.
+    /// A new state with all quantities on which the next step depends.
     fn state(&self) -> State {
         let mut state = State::default();
         self.save(&mut state);
         state
     }
-    /// Goes on from a state of a run of the same plan, to the last bit as that one would.
+    /// Restores the state of a run of the same plan. The next steps are then equal to the last bit.
+    ///
+    /// # Errors
+    /// The state does not fit the plan.
     fn restore(&mut self, state: &State) -> Result<(), StateError>;
-    /// Steps may be no longer than this (s) until told otherwise.
+    /// Sets the largest length of the next steps, s; `None` removes the limit.
     fn limit_step(&mut self, longest: Option<f64>);
-    /// Length of the step that was taken or tried last, s.
+    /// Length of the last step, successful or not, s.
     fn attempted_step(&self) -> f64;
-    /// The first thing about the present state that cannot be.
+    /// Checks the current state.
+    ///
+    /// # Errors
+    /// The first fault that was found.
     fn examine(&self) -> Result<(), Fault>;
 }
 

@@ -1,46 +1,50 @@
-//! Which region fills which part of a cell, to rounding: what the particles at the start stand for.
+//! This module computes which part of a cell each region fills, to rounding. The initial particles
+//! represent these parts.
 //!
-//! A cell is swept by lines; along each the boundaries between regions are found exactly (where a
-//! rectangle or circle meets the line) or by bisection (where an expression changes), so a level
-//! or an undulation far below the spacing of particles keeps its place. Lines run along `y` or
-//! along `x`, whichever meets more boundaries.
+//! Parallel lines sample a cell. The boundaries between regions on a line are computed exactly (for
+//! rectangles and circles) or by bisection (for expressions), so the position of an interface is
+//! accurate far below the particle spacing. The lines are parallel to `y` or to `x`, depending on
+//! which direction crosses more boundaries.
 
 use crate::plan::{Area, Plan};
 use crate::space::shape::GAUSS_3;
 use crate::space::shape::GAUSS_3_WEIGHTS;
 
-/// Parts of a cell below this share are rounding of coordinates.
+/// Smaller fractions of a cell are rounding errors of coordinates.
 const SLIVER: f64 = 1e-9;
-/// Expressions are looked at this often along a line: the smallest drop they can make.
+/// Number of intervals per line at whose ends expressions are evaluated; smaller drops may be
+/// missed.
 const PROBES: usize = 12;
-/// Pieces of two lines each across a cell.
+/// Number of intervals across a cell, with two lines each.
 const PIECES: usize = 6;
-/// Pieces across a cell that is cut: more, for boundaries that leave it through its other sides.
+/// Number of intervals across a cut cell: more, because boundaries may leave it through other
+/// sides.
 const FINE_PIECES: usize = 24;
-/// Halvings of an interval of [`PROBES`]: to rounding.
+/// Number of bisections of an interval of [`PROBES`], which give rounding accuracy.
 const HALVINGS: usize = 50;
-/// Gauss rule of two points on `[0, 1]`.
+/// Two-point Gauss quadrature on `[0, 1]`.
 const GAUSS_2: [f64; 2] = [0.211_324_865_405_187_13, 0.788_675_134_594_812_9];
 
-/// Index of a region, or `None` where only the background is.
+/// Index of the region at a point, or `None` in the background.
 pub type Filling = Option<usize>;
 
-/// A part of a cell that one region fills.
+/// A sample point of a cell, with the area that it represents.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
     /// Reference coordinates.
     pub r: [f64; 2],
-    /// Of the cell's area.
+    /// Fraction of the cell's area.
     pub share: f64,
+    /// Region at the point.
     pub filling: Filling,
 }
 
-/// The region that is painted last over an SI point.
+/// The last region that contains an SI point; later regions cover earlier ones.
 pub fn filling(plan: &Plan, si: [f64; 2]) -> Filling {
     plan.regions.iter().rposition(|r| r.shape.contains(si))
 }
 
-/// Parts of a cell by region; empty if a single region fills it.
+/// Sample points of a cell; empty if a single region fills the cell.
 pub fn samples(plan: &Plan, cell: usize) -> Vec<Sample> {
     let sampler = Sampler::new(plan, cell);
     if sampler.shapes.is_empty() {
@@ -54,20 +58,21 @@ pub fn samples(plan: &Plan, cell: usize) -> Vec<Sample> {
     sampler.sweep(along, FINE_PIECES).samples
 }
 
-/// A cell with the shapes that may have a boundary in it.
+/// A cell and the shapes that may have a boundary in it.
 struct Sampler<'a> {
     plan: &'a Plan,
-    /// SI coordinates of the sides, by axis.
+    /// SI coordinates of the sides of the cell, by axis.
     range: [[f64; 2]; 2],
     shapes: Vec<&'a Area>,
-    /// Some of them are expressions.
+    /// Whether some of the shapes are expressions.
     probing: bool,
 }
 
-/// What a set of parallel lines met.
+/// Samples on a set of parallel lines.
 #[derive(Default)]
 struct Sweep {
     samples: Vec<Sample>,
+    /// Number of boundaries that the lines crossed.
     crossings: usize,
 }
 
@@ -88,7 +93,8 @@ impl<'a> Sampler<'a> {
         Sampler { plan, range, shapes, probing }
     }
 
-    /// Lines along axis `along`, two in each piece of the other axis.
+    /// Samples lines parallel to axis `along`, two in each of `pieces` intervals of the other axis.
+    /// Sides of shapes divide the intervals further.
     fn sweep(&self, along: usize, pieces: usize) -> Sweep {
         let across = 1 - along;
         let mut cuts: Vec<f64> = (0..=pieces).map(|k| k as f64 / pieces as f64).collect();
@@ -127,7 +133,7 @@ impl<'a> Sampler<'a> {
         out
     }
 
-    /// Intervals of one filling along a line; fractions of the cell, ascending.
+    /// Intervals of a line with one filling, ascending, as fractions of the cell.
     fn line(&self, along: usize, at: f64) -> Vec<([f64; 2], Filling)> {
         let across = 1 - along;
         let c = self.coordinate(across, at);
@@ -165,7 +171,7 @@ impl<'a> Sampler<'a> {
                 add(start, piece[1], filling(start + 0.5 * length));
                 continue;
             }
-            // Just inside the ends: a boundary close to a mesh line is not to be missed.
+            // The first and last points are just inside the ends, to find boundaries at mesh lines.
             let probes = (PROBES as f64 * length).ceil().max(1.0) as usize;
             let probe =
                 |k: usize| start + length * (k as f64 / probes as f64).clamp(SLIVER, 1.0 - SLIVER);
@@ -188,18 +194,20 @@ impl<'a> Sampler<'a> {
         parts
     }
 
+    /// SI coordinate of a fraction of the cell along an axis.
     fn coordinate(&self, axis: usize, fraction: f64) -> f64 {
         let [from, to] = self.range[axis];
         from + fraction * (to - from)
     }
 
+    /// Fraction of the cell at an SI coordinate along an axis.
     fn fraction(&self, axis: usize, coordinate: f64) -> f64 {
         let [from, to] = self.range[axis];
         (coordinate - from) / (to - from)
     }
 }
 
-/// Sorts cuts of `[0, 1]` and drops those outside it or too close together.
+/// Sorts cuts of `[0, 1]` and removes those outside the interval or too close together.
 fn tidy(cuts: &mut Vec<f64>) {
     cuts.retain(|&c| c == 0.0 || c == 1.0 || (c > SLIVER && c < 1.0 - SLIVER));
     cuts.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! Saves a simulation into a [`State`] and restores it.
+//! This module saves a simulation in a [`State`] and restores it.
 
 use super::clock::Limiter;
 use super::row::{self, COLUMNS, GaugeRow, Row};
@@ -26,7 +26,7 @@ fn save_particles(p: &Particles, s: &mut State) {
     }
 }
 
-/// Particles with the columns that `like` has; not sorted yet.
+/// Loads particles, with the same columns as `like`; they are not sorted.
 fn load_particles(s: &State, like: &Particles, materials: usize) -> Result<Particles, StateError> {
     let material = s.bytes("particles.material")?.to_vec();
     let n = material.len();
@@ -62,8 +62,8 @@ fn load_particles(s: &State, like: &Particles, materials: usize) -> Result<Parti
     })
 }
 
-/// Columns of a row that the format keeps in one list of numbers, in this order. A column that the
-/// registry gains later is saved under its own name.
+/// Columns of a row that the format saves in one list of numbers, in this order. Columns added to
+/// [`COLUMNS`] later are saved under their own names.
 const ROW_NUMBERS: [&str; 15] = [
     "time",
     "dt",
@@ -82,7 +82,8 @@ const ROW_NUMBERS: [&str; 15] = [
     "director_error",
 ];
 
-/// The same for counts; the limiter is saved by its place in [`Limiter::ALL`].
+/// Columns of a row that are saved in one list of counts. The limiter is saved as its index in
+/// [`Limiter::ALL`].
 const ROW_COUNTS: [&str; 8] = [
     "step",
     "dt_limiter",
@@ -94,7 +95,7 @@ const ROW_COUNTS: [&str; 8] = [
     "held",
 ];
 
-/// The value of a column by name.
+/// The value of a row in the column with a name.
 fn of_row(row: &Row, name: &str) -> f64 {
     COLUMNS.iter().find(|c| c.name == name).map_or(f64::NAN, |c| c.number(row))
 }
@@ -113,7 +114,7 @@ fn save_row(row: &Row, s: &mut State) {
     save_phases("row.seconds", &row.seconds, s);
 }
 
-/// Columns that the first version of the format did not have.
+/// Columns that are not in the first version of the format.
 fn later_columns() -> impl Iterator<Item = &'static row::Column> {
     let known = |c: &&row::Column| {
         ROW_NUMBERS.contains(&c.name) || ROW_COUNTS.contains(&c.name) || c.name == "mean_alignment"
@@ -139,7 +140,7 @@ fn load_row(s: &State, gauges: usize, materials: usize) -> Result<Row, StateErro
             return Err(out_of_range("row.counts", value));
         }
     }
-    // Numbers are written such that they are read back to the last bit.
+    // The text of a number is read back to the last bit.
     let list = ROW_NUMBERS.into_iter().zip(numbers);
     let later = later_columns().map(|c| {
         let value = s.try_floats(&format!("row.{}", c.name)).and_then(|v| v.first().copied());
@@ -157,7 +158,7 @@ fn load_row(s: &State, gauges: usize, materials: usize) -> Result<Row, StateErro
 }
 
 impl<const D: usize> Simulation<D> {
-    /// Everything that the next step depends on.
+    /// Saves all quantities on which the next step depends.
     pub(super) fn save(&self, s: &mut State) {
         save_particles(&self.particles, s);
         s.put_floats("flow.velocity", flat(&self.flow.velocity));
@@ -170,7 +171,8 @@ impl<const D: usize> Simulation<D> {
         } else {
             names.iter().for_each(|name| s.remove(name));
         }
-        // The points follow from the factors that they were made with; the new factors from both.
+        // The integration points follow from these factors, and the current factors from the
+        // points.
         s.put_floats("quadrature.factors", self.factors_of_points.iter().copied());
         s.put_floats("gauges", self.gauges.iter().map(|g| g.volume));
         if let Some(dye) = &self.dye {
@@ -186,8 +188,10 @@ impl<const D: usize> Simulation<D> {
         save_row(&self.row, s);
     }
 
-    /// Goes back, or ahead, to a state of a run of the same plan. After an error the run is what it
-    /// was before.
+    /// Restores a state of a run of the same plan.
+    ///
+    /// # Errors
+    /// The state does not fit the plan.
     pub(super) fn load(&mut self, s: &State) -> Result<(), StateError> {
         let plan = self.plan.clone();
         let (mesh, materials) = (&plan.mesh, self.matter.materials.len());

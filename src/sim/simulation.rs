@@ -1,4 +1,4 @@
-//! One run at one instant, and its set-up.
+//! This module holds the data of a run at its current time, and creates them from a plan.
 
 use super::clock::{self, Limiter};
 use super::error::SimError;
@@ -22,57 +22,65 @@ use crate::space::population::{Count, Population};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A run at one instant. `D` is 2, or 3 with Cosserat rotation; see [`start`] for the choice.
+/// A run at its current time, in the plan's units. `D` is the number of velocity unknowns per node:
+/// 2, or 3 with Cosserat rotation; [`start`](super::start) chooses it.
 pub struct Simulation<const D: usize> {
     pub(super) plan: Arc<Plan>,
     pub(super) stokes: Stokes<D>,
     pub(super) quadrature: Quadrature,
-    /// Of [`Quadrature::factors`]: those that its points were made with.
+    /// Volume factors of the materials with which the current integration points were made.
     pub(super) factors_of_points: Vec<f64>,
     pub(super) density: Density,
     pub(super) terms: Terms,
-    /// Those that restoring terms may lie on; none where no scene calls for them.
+    /// Faces on which restoring terms may act; empty without stabilisation.
     pub(super) restoring_faces: Vec<Face>,
     pub(super) particles: Particles,
     pub(super) velocities: CellVelocities,
-    /// Cells that a unit velocity of each node may cross per unit time.
+    /// Cells that a unit velocity at each node crosses per unit time, by direction.
     pub(super) crossing_rates: Vec<[f64; 2]>,
     pub(super) displacements: Displacements,
     pub(super) flow: Flow<D>,
-    /// The solution before; none at the start and after a sudden change.
+    /// The previous solution; `None` at the start and after a scheduled change.
     pub(super) previous: Option<Before<D>>,
-    /// Room for the solution before the next one.
+    /// Buffer for the next previous solution.
     pub(super) spare: Flow<D>,
-    /// Velocities in the middle of a step, for points to move with.
+    /// Nodal velocities at the middle of the step, with which points are advected.
     pub(super) half: Vec<[f64; 2]>,
-    /// Nodal forces that do not change: tractions and fixed body forces.
+    /// Constant nodal forces: tractions and body forces fixed in space.
     pub(super) fixed_load: Vec<[f64; D]>,
+    /// Nodal forces of the current solution.
     pub(super) load: Vec<[f64; D]>,
-    /// The load without gravity's.
+    /// Nodal forces without gravity.
     pub(super) other_load: Vec<[f64; D]>,
+    /// Current materials and gravity.
     pub(super) matter: Matter,
-    /// Counts changes of matter, so that constant element matrices know when to change.
+    /// Number of changes of matter so far; constant element matrices are recomputed when it
+    /// changes.
     pub(super) version: u32,
+    /// Index of the next scheduled change.
     pub(super) next_change: usize,
     pub(super) population: Population,
     pub(super) gauges: Vec<Counter>,
     pub(super) dye: Option<DyeLines>,
     pub(super) count: Count,
+    /// Current time, in the plan's units.
     pub(super) time: f64,
+    /// Number of steps taken.
     pub(super) step: u64,
-    /// Projected areas over particle volumes at the start.
+    /// Projected area over particle volume of each material at the start.
     pub(super) baseline: Vec<f64>,
+    /// Power of all loads except gravity at the last row, W/m.
     pub(super) last_other_power: f64,
     pub(super) row: Row,
     pub(super) report: Report,
     pub(super) events: Vec<String>,
-    /// No step may be longer (SI); see [`Run::limit_step`].
+    /// Largest step, s; see [`Run::limit_step`](super::Run::limit_step).
     pub(super) longest: Option<f64>,
-    /// The step that is being taken, or was.
+    /// Length of the current or last step, in the plan's units.
     pub(super) attempted: f64,
 }
 
-/// The solution before the current one, and the step between them.
+/// The previous solution, and the length of the step from it to the current one.
 #[derive(Clone)]
 pub(super) struct Before<const D: usize> {
     pub(super) flow: Flow<D>,
@@ -80,6 +88,10 @@ pub(super) struct Before<const D: usize> {
 }
 
 impl<const D: usize> Simulation<D> {
+    /// Creates the initial particles of a plan and solves for the initial flow.
+    ///
+    /// # Errors
+    /// A part of the scene has no material, or the initial flow cannot be solved for.
     pub fn new(plan: Arc<Plan>) -> Result<Self, SimError> {
         let clock = Instant::now();
         let mesh = plan.mesh.clone();
@@ -140,9 +152,11 @@ impl<const D: usize> Simulation<D> {
         Ok(sim)
     }
 
+    /// The current velocity, rotation and pressure, in the plan's units.
     pub fn flow(&self) -> &Flow<D> {
         &self.flow
     }
+    /// The report of the last solution.
     pub fn report(&self) -> &Report {
         &self.report
     }

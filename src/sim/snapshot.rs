@@ -1,4 +1,5 @@
-//! What the recording shows of a state: particles, dye, strokes, fields and level lines, in SI.
+//! This module makes the snapshot of a state for the recording: particles, dye lines, director
+//! glyphs, fields, arrows and isolines, in SI units.
 
 mod raster;
 
@@ -13,22 +14,22 @@ use crate::space::shape::Shape;
 use crate::threads;
 use raster::{Coarse, Raster, isoline, range, symmetric};
 
-/// Samples of a field that are worth a task of their own.
+/// Number of field samples in a parallel task.
 const SAMPLE_GRAIN: usize = 2048;
 
-/// Samples of a field along the longer side of the domain.
+/// Number of field samples along the longer side of the domain.
 const FIELD_SAMPLES: f64 = 240.0;
-/// Arrows along the longer side of the domain.
+/// Number of arrows along the longer side of the domain.
 const ARROWS: f64 = 28.0;
-/// Levels of mean |n_x| that are drawn, the first one being near the random mean 2/pi.
+/// Levels of mean |n_x| that are drawn; the first is near 2/pi, the mean of random directors.
 const ALIGNMENT_LEVELS: [f32; 6] = [0.6, 0.5, 0.4, 0.3, 0.2, 0.1];
 
-/// Every how many particles one is drawn.
+/// The number `n` such that every `n`-th particle is drawn, for `drawn` particles in total.
 pub fn thinning(plan: &Plan, drawn: usize) -> usize {
     drawn.div_ceil(plan.content.max_particles.max(1)).max(1)
 }
 
-/// Particles that are drawn: all but the background's.
+/// Indices of the particles to draw: all except those of the background material.
 pub fn drawn(plan: &Plan, particles: &Particles) -> Vec<usize> {
     let background = plan.background();
     (0..particles.len()).filter(|&p| Some(particles.material[p]) != background).collect()
@@ -129,7 +130,7 @@ impl<const D: usize> Simulation<D> {
         Some(ParticleScalar { range, values })
     }
 
-    /// A field on the raster; `None` if this run does not have it.
+    /// A field on a raster; `None` if this run does not have the field.
     fn field(&self, name: FieldName) -> Option<GridField> {
         let plan = &self.plan;
         let mesh = &plan.mesh;
@@ -189,7 +190,7 @@ impl<const D: usize> Simulation<D> {
         })
     }
 
-    /// A Cosserat material fills some of a cell.
+    /// Whether a cell contains a Cosserat material.
     fn rotates(&self, cell: usize) -> bool {
         (0..self.matter.materials.len()).any(|m| {
             self.matter.materials[m].law.rotation.is_some()
@@ -197,7 +198,7 @@ impl<const D: usize> Simulation<D> {
         })
     }
 
-    /// Mean |n_x| on a coarse raster.
+    /// Mean |n_x| on a coarse raster; `None` without directors.
     fn alignment(&self) -> Option<Coarse> {
         let directors = self.particles.director.as_ref()?;
         let plan = &self.plan;
@@ -216,7 +217,7 @@ impl<const D: usize> Simulation<D> {
         Some(Coarse { raster, values })
     }
 
-    /// Velocities on a coarse raster; the fastest is as long as the raster is wide.
+    /// Velocity arrows on a coarse raster; the longest is as long as the raster spacing.
     fn arrows(&self) -> Arrows {
         let plan = &self.plan;
         let raster = Raster::new(plan, ARROWS);
@@ -240,7 +241,7 @@ impl<const D: usize> Simulation<D> {
         }
     }
 
-    /// Strokes along the layers' normals, evenly spaced.
+    /// Evenly spaced line segments along the normals of the layers.
     fn glyphs(&self) -> Vec<[[f32; 2]; 2]> {
         let Some(directors) = &self.particles.director else { return vec![] };
         let plan = &self.plan;

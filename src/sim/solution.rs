@@ -1,4 +1,5 @@
-//! The solution of a step: integration points, loads, velocity, rotation and pressure.
+//! This module solves for the flow of a step: integration points, loads, velocity, rotation and
+//! pressure.
 
 use super::Integrator;
 use super::error::SimError;
@@ -12,8 +13,8 @@ use crate::space::flow::Flow;
 use std::time::Instant;
 
 impl<const D: usize> Simulation<D> {
-    /// Solves for the flow of the particles where they are. `restoring`: how far ahead restoring
-    /// loads are taken, and the velocity before.
+    /// Solves for the flow at the current particle positions. `restoring`: the time ahead for which
+    /// restoring loads are computed, and the previous flow.
     pub(super) fn solve(
         &mut self,
         restoring: Option<(f64, &Flow<D>)>,
@@ -54,7 +55,7 @@ impl<const D: usize> Simulation<D> {
 
     fn update_restoring(&mut self, restoring: Option<(f64, &Flow<D>)>) {
         let Some((ahead, before)) = restoring else { return self.terms.restoring.clear() };
-        // First-order stepping has no other use for the velocity before.
+        // First-order time stepping does not use the previous velocity.
         let still = self.plan.method.integrator == Integrator::Euler;
         let before = before.velocity.iter().map(|u| if still { [0.0; 2] } else { [u[0], u[1]] });
         let viscosities = self.matter.materials.iter().map(|m| m.viscosity);

@@ -1,4 +1,4 @@
-//! One step, start to end.
+//! This module takes one step of a run.
 
 use super::Integrator;
 use super::clock::{Limiter, next_step};
@@ -11,11 +11,14 @@ use crate::plan::When;
 use crate::space::population::Count;
 use std::time::Instant;
 
-/// A step is taken again, shorter, if its middle crosses this many times the cells it may.
+/// A step is shortened if the half-step velocity exceeds its Courant limit by this factor.
 const SURPRISE: f64 = 4.0;
 
 impl<const D: usize> Simulation<D> {
     /// Takes one step.
+    ///
+    /// # Errors
+    /// The time step is too short, a cell is empty, or the solver failed.
     pub fn advance(&mut self) -> Result<(), SimError> {
         let clock = Instant::now();
         let mut seconds = Phases::default();
@@ -35,7 +38,8 @@ impl<const D: usize> Simulation<D> {
                 return Err(SimError::Step { step: self.step + 1, time: self.si_time(), dt });
             }
             extra += self.find_half_step_velocity(dt, &mut seconds)?;
-            // A flow that has hardly begun says nothing about its own middle of the step.
+            // At the start of a flow, the half-step velocity can be much larger than the current
+            // one.
             let crossed = dt * self.crossings(|node| self.half[node]);
             let most = self.plan.clock.courant;
             if crossed <= SURPRISE * most {
@@ -77,7 +81,7 @@ impl<const D: usize> Simulation<D> {
         let changed = self.apply_changes();
         let mut before = std::mem::take(&mut self.spare);
         before.copy_from(&self.flow);
-        // After a sudden change the flow before says nothing about the one to come.
+        // After a sudden change, the previous flow does not predict the next one.
         let ahead = (!changed).then(|| self.ahead(self.expected_step(dt)));
         if let (Some(previous), false) = (&self.previous, changed) {
             self.flow.extrapolate(&previous.flow, dt / previous.dt);
@@ -95,25 +99,28 @@ impl<const D: usize> Simulation<D> {
         Ok(())
     }
 
-    /// Parts in which points go through a velocity frozen for `dt`: one as long as none crosses
-    /// more than a cell, else parts of half a cell, for longer ways would crowd and thin out what a
-    /// flow without divergence keeps apart.
+    /// Number of substeps in which points are advected through a velocity frozen for `dt`: one if
+    /// no point crosses more than a cell; otherwise each substep crosses at most half a cell.
+    /// Longer substeps would make the particle density uneven although the flow is divergence-free.
     fn parts(&self, dt: f64) -> u32 {
         let crossed = dt * self.crossings(|node| self.half[node]);
         if crossed > 1.0 { (2.0 * crossed).ceil().min(1e4) as u32 } else { 1 }
     }
 
+    /// Current time, s.
     pub(super) fn si_time(&self) -> f64 {
         self.time * self.plan.units.time
     }
 
+    /// The next time at which a step must end, in the plan's units.
     fn next_stop(&self) -> f64 {
         let clock = &self.plan.clock;
         let later = |&&s: &&f64| s > self.time * (1.0 + 1e-14);
         clock.stops.iter().find(later).copied().unwrap_or(clock.end)
     }
 
-    /// Finds the velocity in the middle of a step of `dt`; corrections spent on it.
+    /// Computes the velocity at the middle of a step of length `dt`, stores it in `half`, and
+    /// returns the number of solver corrections.
     fn find_half_step_velocity(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
         self.flow.translation(&mut self.half);
         match (self.plan.method.integrator, &self.previous) {
@@ -131,8 +138,9 @@ impl<const D: usize> Simulation<D> {
         }
     }
 
-    /// Moves a copy of the particles half a step with the velocity in `half`, solves there, and leaves
-    /// that velocity in `half`.
+    /// Advects a copy of the particles by half a step with the velocity in `half`, solves for the
+    /// flow at these positions, and stores its velocity in `half`. Returns the number of solver
+    /// corrections.
     fn solve_half_step(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
         let plan = self.plan.clone();
         let phase = Instant::now();
@@ -158,8 +166,8 @@ impl<const D: usize> Simulation<D> {
         seconds.motion += phase.elapsed().as_secs_f64();
         let here = std::mem::replace(&mut self.particles, there);
         let flow = self.flow.clone();
-        // At the first step a mode must at worst turn round: half a step ahead, neither more nor
-        // less, makes that the trapezoidal rule.
+        // In the first step a mode may at most change its sign. With exactly half a step ahead, the
+        // method is the trapezoidal rule.
         let ahead = self.ahead(dt).map(|t| if self.previous.is_none() { 0.5 * dt } else { t });
         let solved = self.solve(ahead.map(|t| (t, &flow)), seconds);
         std::mem::replace(&mut self.flow, flow).translation(&mut self.half);
@@ -168,7 +176,7 @@ impl<const D: usize> Simulation<D> {
         Ok(self.report.corrections)
     }
 
-    /// Applies the changes of matter that are due; whether there were any.
+    /// Applies the scheduled changes that are due, and returns whether there were any.
     pub(super) fn apply_changes(&mut self) -> bool {
         self.events.clear();
         let mut any = false;
@@ -183,7 +191,7 @@ impl<const D: usize> Simulation<D> {
             }
             let before = self.potential_energy();
             self.matter = change.state.clone();
-            // A change of gravity does work on everything at once.
+            // A change of gravity changes the potential energy of all particles at once.
             let jump = self.potential_energy() - before;
             self.row.work += jump * self.plan.units.energy();
             self.events.push(format!("step {}: {}", self.step, change.label));
@@ -194,13 +202,14 @@ impl<const D: usize> Simulation<D> {
         any
     }
 
-    /// How far ahead restoring loads are taken, for a step of `dt`.
+    /// Time ahead for which restoring loads are computed, for a step of length `dt`; `None` without
+    /// stabilisation or stratification.
     fn ahead(&self, dt: f64) -> Option<f64> {
         let share = self.plan.method.stabilisation.filter(|_| self.matter.is_stratified());
         share.map(|share| share * dt)
     }
 
-    /// The step to come, as far as the flow before and the step before can tell.
+    /// Expected length of the next step, from the current flow and the last step length `dt`.
     fn expected_step(&self, dt: f64) -> f64 {
         let (next, _) = next_step(&self.plan.clock, self.time, Some(dt), self.speeds());
         if next > 0.0 { next } else { dt }

@@ -145,3 +145,11 @@ fn a_closed_output_pipe_is_not_an_error() {
     let output = child.wait_with_output().expect("an end");
     Said::new(&["schema"], output).exits(0);
 }
+
+#[test]
+fn the_page_of_columns_is_that_of_the_program() {
+    let here = TempFolder::new();
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/columns.md");
+    let said = here.grainscope(&["columns"]).exits(0);
+    assert_eq!(said.out.trim(), std::fs::read_to_string(page).expect("a page").trim());
+}

@@ -195,7 +195,7 @@ fn a_failed_run_leaves_its_last_good_state() {
             "likely",
         ]);
         if policy != "stop" {
-            said.complains(&["taken again 4 times"]);
+            said.complains(&["repeated 4 times"]);
         }
         let table = Table::read(&here.read(&format!("{policy}/series.csv")));
         assert_eq!(table.text("step").last(), Some(&"3"));

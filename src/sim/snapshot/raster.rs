@@ -1,4 +1,4 @@
-//! Regular grids on which fields are drawn, and their isolines.
+//! This module holds the regular grids on which fields are drawn, and computes isolines on them.
 
 use crate::frame::{GridField, Isoline};
 use crate::plan::Plan;
@@ -7,12 +7,16 @@ use crate::space::shape::Shape;
 
 /// A regular grid of points over the domain, in the plan's units.
 pub(super) struct Raster {
+    /// Lower left corner.
     pub(super) origin: [f64; 2],
+    /// Distance of neighbouring points, by direction.
     pub(super) step: [f64; 2],
+    /// Number of columns and rows.
     pub(super) n: [usize; 2],
 }
 
 impl Raster {
+    /// A grid with about `along_longer` points along the longer side of the domain.
     pub(super) fn new(plan: &Plan, along_longer: f64) -> Self {
         let (x, y) = (&plan.mesh.x, &plan.mesh.y);
         let step = x.length().max(y.length()) / along_longer;
@@ -24,6 +28,7 @@ impl Raster {
         }
     }
 
+    /// Position of point `k`; points are numbered row by row.
     pub(super) fn centre(&self, k: usize) -> [f64; 2] {
         let (i, j) = (k % self.n[0], k / self.n[0]);
         [
@@ -32,16 +37,18 @@ impl Raster {
         ]
     }
 
+    /// Index of the point nearest to a position.
     pub(super) fn index(&self, p: [f64; 2]) -> usize {
         let at = |c: usize| (((p[c] - self.origin[c]) / self.step[c]) as usize).min(self.n[c] - 1);
         at(1) * self.n[0] + at(0)
     }
 
+    /// Number of points.
     pub(super) fn len(&self) -> usize {
         self.n[0] * self.n[1]
     }
 
-    /// Where its columns and rows stand in the mesh.
+    /// Positions of the columns and rows in the mesh.
     pub(super) fn stand(&self, mesh: &Mesh) -> [Vec<Stand>; 2] {
         let stand = |axis: &Axis, x: f64| {
             let cell = axis.locate(x);
@@ -55,15 +62,18 @@ impl Raster {
     }
 }
 
-/// A column or row of a raster: its cells, where in them it is, and the shape functions there.
+/// Position of a column or row of a raster in the mesh.
 #[derive(Clone, Copy)]
 pub(super) struct Stand {
+    /// Index of the cell along the axis.
     pub(super) cell: usize,
+    /// Reference coordinate in the cell.
     pub(super) r: f64,
+    /// Shape functions at `r`.
     pub(super) n: [f64; 3],
 }
 
-/// Smallest and largest finite value; `[0, 1]` if there is none.
+/// Smallest and largest finite value; `[0, 1]` if they are equal or there is none.
 pub(super) fn range(values: &[f32]) -> [f32; 2] {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let (low, high) =
@@ -71,18 +81,20 @@ pub(super) fn range(values: &[f32]) -> [f32; 2] {
     if low < high { [low, high] } else { [0.0, 1.0] }
 }
 
+/// The smallest range that is symmetric about zero and contains a range.
 pub(super) fn symmetric([low, high]: [f32; 2]) -> [f32; 2] {
     let m = low.abs().max(high.abs());
     [-m, m]
 }
 
-/// Means on a coarse raster, read by bilinear interpolation between its centres.
+/// Values on a coarse raster, with bilinear interpolation between its points.
 pub(super) struct Coarse {
     pub(super) raster: Raster,
     pub(super) values: Vec<f64>,
 }
 
 impl Coarse {
+    /// Interpolated values at the points of another raster.
     pub(super) fn sample(&self, fine: &Raster) -> Vec<f32> {
         let r = &self.raster;
         (0..fine.len())
@@ -104,7 +116,7 @@ impl Coarse {
     }
 }
 
-/// Lines of one level through the centres of a field's cells (marching squares).
+/// Isoline of a field at a level, interpolated between its points (marching squares).
 pub(super) fn isoline(f: &GridField, level: f32) -> Isoline {
     let point = |i: usize, j: usize| {
         [f.origin[0] + (i as f32 + 0.5) * f.cell[0], f.origin[1] + (j as f32 + 0.5) * f.cell[1]]
@@ -116,8 +128,8 @@ pub(super) fn isoline(f: &GridField, level: f32) -> Isoline {
             let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
             let mut cuts: Vec<[f32; 2]> = Vec::with_capacity(4);
             for e in 0..4 {
-                // In one order for both cells at the edge: the cut is the same to the last bit, and
-                // segments join.
+                // Both squares at an edge use the same order of its ends, so that the cut is equal
+                // to the last bit and the segments can be joined.
                 let ends = (corners[e], corners[(e + 1) % 4]);
                 let ((ai, aj), (bi, bj)) = if ends.0 < ends.1 { ends } else { (ends.1, ends.0) };
                 let (a, b) = (value(ai, aj) - level, value(bi, bj) - level);
