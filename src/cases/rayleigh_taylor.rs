@@ -44,19 +44,6 @@ pub struct Layer {
 /// where 1 is the upper and 2 the lower layer. The rate agrees to rounding with the solution of the
 /// fourth-order equations of the vertical velocities of the layers, matched at the interface
 /// (velocity, shear stress, and a normal stress that jumps by the weight of the undulation).
-///
-/// ```
-/// use grainscope::cases::rayleigh_taylor::{Layer, Layers, ramberg_growth_rate};
-/// // The box of van Keken et al. (1997), isoviscous.
-/// let layer = |thickness, density| Layer { thickness, viscosity: 1.0, density };
-/// let rate = ramberg_growth_rate(&Layers {
-///     upper: layer(0.8, 1.0),
-///     lower: layer(0.2, 0.0),
-///     wavelength: 1.8284,
-///     gravity: 1.0,
-/// });
-/// assert!((rate - 0.01094019).abs() < 1e-8);
-/// ```
 pub fn ramberg_growth_rate(layers: &Layers) -> f64 {
     let Layers { upper, lower, wavelength, gravity } = layers;
     let r = upper.viscosity / lower.viscosity;
