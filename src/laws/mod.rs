@@ -2,7 +2,7 @@
 //! particles and the time.
 //!
 //! The plan chooses a [`Law`] for each material. At an integration point, the law takes the state
-//! [`Here`] and returns a [`PointLaw`](point::PointLaw), the linear operator whose product with the
+//! [`Here`] and returns a [`PointLaw`], the linear operator whose product with the
 //! rates is the stress. Element matrices, internal forces and laminates use these functions; the
 //! conformance tests in `tests/physics/laws.rs` test the same functions.
 //!

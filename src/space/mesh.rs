@@ -112,7 +112,7 @@ impl Axis {
     }
 
     /// Cell that contains a coordinate. Coordinates outside the axis belong to the nearest cell;
-    /// coordinates on a line (within [`ON_LINE`]) belong to the cell above it.
+    /// coordinates on a line (within `ON_LINE`) belong to the cell above it.
     pub fn locate(&self, x: f64) -> usize {
         let b = ((x - self.lines[0]) * self.bins_per_length) as usize;
         let mut cell = self.bins[b.min(self.bins.len() - 1)] as usize;

@@ -228,7 +228,7 @@ impl<const D: usize> Multifrontal<D> {
     /// Factors the fronts above cells that changed.
     ///
     /// # Errors
-    /// Returns [`NotPositiveDefinite`] at the first pivot that is not positive. The fronts marked
+    /// Returns `NotPositiveDefinite` at the first pivot that is not positive. The fronts marked
     /// for factorisation then stay marked.
     pub fn factorize(&mut self, cells: &[CellBlocks<D>]) -> Result<(), NotPositiveDefinite> {
         self.spread_stale();

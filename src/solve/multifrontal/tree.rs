@@ -26,7 +26,7 @@ pub struct Tree {
     pub parent: Vec<Option<usize>>,
     /// Mesh node of each position of the elimination order.
     pub node: Vec<u32>,
-    /// Position of each mesh node, or [`NO_POSITION`].
+    /// Position of each mesh node, or `NO_POSITION`.
     pub position: Vec<u32>,
 }
 
