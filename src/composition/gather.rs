@@ -5,6 +5,7 @@
 //! `exp(-r^2 / (0.4 h)^2)`.
 
 use super::Kind;
+use super::centroids::Centroids;
 use super::features::{self, Strip};
 use super::interface::{Interface, Surroundings};
 use crate::laws::director::Orientation;
@@ -37,6 +38,7 @@ pub struct Gathered {
     viscosity: Vec<Option<Polynomial>>,
     /// Orientation of all directors of the cell, by material.
     cell_orientation: Vec<Orientation>,
+    centroids: Centroids,
     /// Particles of the cell and its neighbours.
     surroundings: Surroundings,
     /// Working memory.
@@ -87,6 +89,7 @@ impl Gathered {
         self.volume.resize(materials, 0.0);
         self.log_viscosity.resize(materials, Fit::default());
         self.cell_orientation.resize(materials, Orientation::default());
+        self.centroids.prepare(materials);
     }
 
     /// Computes the sums over the particles of a cell.
@@ -96,6 +99,7 @@ impl Gathered {
         self.volume.fill(0.0);
         self.log_viscosity.iter_mut().for_each(Fit::clear);
         self.cell_orientation.fill(Orientation::default());
+        self.centroids.clear();
         for p in particles.of_cell(cell) {
             let m = particles.material[p] as usize;
             let volume = particles.volume[p];
@@ -108,6 +112,7 @@ impl Gathered {
             let kx = GAUSS_3.map(|g| kernel(r[0], g));
             let ky = GAUSS_3.map(|g| kernel(r[1], g));
             self.volume[m] += volume;
+            self.centroids.add(m, volume, r);
             if let Some(n) = director {
                 self.cell_orientation[m].add(volume, n);
             }
@@ -184,6 +189,17 @@ impl Gathered {
                 break;
             }
         }
+    }
+
+    /// Shares and shifted centroids of the materials, for the factors and viscosities of all
+    /// materials. To be called once for a gathered cell.
+    pub fn centroids(
+        &mut self,
+        factors: &[f64],
+        viscosity: impl Iterator<Item = f64> + Clone,
+    ) -> &Centroids {
+        self.centroids.finish(factors, viscosity);
+        &self.centroids
     }
 
     /// Fits the carried viscosities, which [`Gathered::viscosity_at`] then returns.

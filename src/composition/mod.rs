@@ -4,9 +4,11 @@
 //! [`Composition`] holds the content of every cell. [`Gathered`] holds the sums over the particles
 //! of one mixed cell, which [`solve::quadrature`](crate::solve::quadrature) evaluates.
 
+pub mod centroids;
 pub mod features;
 mod gather;
 pub mod interface;
+pub mod straight;
 
 pub use gather::{Gathered, SCRATCH};
 

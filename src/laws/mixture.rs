@@ -24,13 +24,17 @@ fn shifted(s: &Sym2, f: f64) -> Sym2 {
 /// `cut_cosserat_drops_converge` measures this error.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mixture {
+    /// Whether all means are arithmetic.
+    parallel: bool,
     /// Viscosity of the material that surrounds the others; zero if there is none.
     around: f64,
-    fluidity: Sym2,
+    /// Mean of the inverse deviatoric viscosities, or of the deviatoric viscosities if parallel.
+    shear: Sym2,
     inverse_dilation: f64,
+    /// Share of the materials with dilation, or the mean dilation if parallel.
     dilation_share: f64,
-    /// The sum of `phi_m eta_c,m / eta_m`.
-    coupling_share: f64,
+    /// The sum of `phi_m eta_c,m / eta_m`, or of `phi_m eta_c,m` if parallel.
+    coupling: f64,
     couple: f64,
 }
 
@@ -44,21 +48,37 @@ impl Mixture {
         Mixture { around: viscosity, ..Mixture::default() }
     }
 
+    /// An empty mixture whose materials all have the same rates: every mean is arithmetic, so the
+    /// stiffest material determines the shear. This is the bound of Voigt.
+    pub fn parallel() -> Self {
+        Mixture { parallel: true, ..Mixture::default() }
+    }
+
     /// Adds a material with the volume fraction `phi`.
     pub fn add(&mut self, phi: f64, law: &PointLaw) {
+        self.couple += phi * law.couple;
+        if self.parallel {
+            self.shear.add_scaled(phi, &law.shear);
+            self.dilation_share += phi * law.dilation;
+            self.coupling += phi * law.coupling;
+            return;
+        }
         let shear = shifted(&law.shear, self.around);
-        self.fluidity.add_scaled(phi, &shear.inverse());
+        self.shear.add_scaled(phi, &shear.inverse());
         if law.dilation > 0.0 {
             self.inverse_dilation += phi / (law.dilation + self.around);
             self.dilation_share += phi;
         }
-        self.coupling_share += phi * law.coupling / law.shear.mean();
-        self.couple += phi * law.couple;
+        self.coupling += phi * law.coupling / law.shear.mean();
     }
 
     /// The law of the mixture; the volume fractions must add up to one.
     pub fn law(&self) -> PointLaw {
-        let shear = shifted(&self.fluidity.inverse(), -self.around);
+        if self.parallel {
+            let (shear, dilation) = (self.shear, self.dilation_share);
+            return PointLaw { shear, dilation, coupling: self.coupling, couple: self.couple };
+        }
+        let shear = shifted(&self.shear.inverse(), -self.around);
         PointLaw {
             shear,
             dilation: if self.dilation_share > 0.0 {
@@ -67,7 +87,7 @@ impl Mixture {
             } else {
                 0.0
             },
-            coupling: self.coupling_share * shear.mean(),
+            coupling: self.coupling * shear.mean(),
             couple: self.couple,
         }
     }

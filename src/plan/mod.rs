@@ -289,6 +289,11 @@ impl Plan {
         if self.effects.rotation { 3 } else { 2 }
     }
 
+    /// Whether gravity or an acceleration acts on the materials.
+    pub fn has_weight(&self) -> bool {
+        self.effects.gravity || self.acceleration.is_some()
+    }
+
     /// Index of the background material, which fills the part of the domain outside all regions.
     pub fn background(&self) -> Option<u8> {
         self.state.materials.iter().position(|m| m.background).map(|m| m as u8)

@@ -101,7 +101,12 @@ impl<const D: usize> Simulation<D> {
         let particles = initial::particles(&plan)?;
         let fixed_load = plan.fixed_loads::<D>();
         let mut sim = Simulation {
-            quadrature: Quadrature::new(&mesh, plan.method.quadrature, plan.state.materials.len()),
+            quadrature: Quadrature::new(
+                &mesh,
+                plan.method.quadrature,
+                plan.state.materials.len(),
+                plan.has_weight(),
+            ),
             terms: Terms::of(&plan),
             restoring_faces: if plan.method.stabilisation.is_some() {
                 open_faces(&mesh, &plan.enclosure)

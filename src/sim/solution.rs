@@ -70,7 +70,7 @@ impl<const D: usize> Simulation<D> {
 
     fn update_load(&mut self) {
         let plan = self.plan.clone();
-        if !plan.effects.gravity && plan.acceleration.is_none() {
+        if !plan.has_weight() {
             return;
         }
         self.load.copy_from_slice(&self.fixed_load);

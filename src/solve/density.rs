@@ -6,7 +6,7 @@
 //! ```text
 //! chi_m(xi, eta) = s_m (1 + 3 X_m xi + 3 Y_m eta),   rho = sum_m chi_m rho_m
 //! ```
-//! where `s_m` is the material's share of the volume of the particles and `(X_m, Y_m)` its
+//! where `s_m` is the material's share of the volume of the particles and `(X_m, Y_m)` its shifted
 //! centroid. This is the projection of the true density on linear functions, which needs no
 //! assumption about the density between particles. The omitted part does work only on the curvature
 //! of the velocity. Shares smoothed by a kernel, which the viscosity uses, would transfer the noise
@@ -14,31 +14,26 @@
 //! inside a cell then moves with 3e-3 rho g a^2/eta at a viscosity contrast of 1000, and not at all
 //! with exact moments.
 //!
-//! The centroid of all particles of a cell should be its centre. As particles slide past one
-//! another it is not, until some cross a face. The centroids are shifted to compensate, those of
-//! materials that move easily more than those of stiff ones,
+//! `s_m` and `(X_m, Y_m)` are those of [`centroids`](crate::composition::centroids).
 //!
-//! ```text
-//! X_m - o w_m,   o = sum s_m X_m
-//! w_m = b + (1 - b) (1/eta_m) / sum s_k/eta_k,   b = sum s_k eta_k/eta_max
-//! ```
-//! With equal shifts, thin fluid that slides along the interface of a stiff fluid seems to tilt it,
-//! and the tilt makes the thin fluid slide: at a contrast of 1e6, the speed of a fluid at rest
-//! (rounding) doubled with every step. In cells nearly full of the stiff fluid, `b` keeps the
-//! shifts nearly equal: there the slip of the thin fluid has little effect, and a shift of the
-//! stiff fluid would affect all.
+//! Where a straight line separates the materials of a cell (see [`straight`]
+//! (crate::composition::straight)), either side has its own density: the weight of a fluid then acts
+//! where its stiffness is. Spread linearly over the whole cell, the weight of the heavy fluid acts
+//! on the thin one too and drives it.
 //!
 //! `rho_m` is a quadratic fit if particles carry their density. Particles of neighbouring cells
 //! contribute to the fit with a small weight.
 
+use super::points::Line;
 use super::quadrature::Quadrature;
 use crate::composition::Content;
+use crate::composition::centroids::Centroids;
 use crate::plan::material::Material;
-use crate::space::fit::{Degree, Fit};
+use crate::space::fit::{Degree, Fit, Polynomial};
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
-use crate::space::shape::GAUSS_3X3;
+use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, GaussPoint, SUBPOINTS};
 
 /// Weight per volume of a neighbour's particle in a fit, relative to the cell's own particles, by
 /// its reference coordinates.
@@ -52,20 +47,18 @@ fn lent([x, y]: [f64; 2]) -> f64 {
     0.1 * ((2.0 - x * x - y * y) / 0.7).exp().min(1.0)
 }
 
-/// Densities at the 3 x 3 Gauss points of each cell.
+/// Densities of each cell.
 pub struct Density {
     neighbours: Neighbours,
+    /// Linear densities at the points of [`GAUSS_3X3`].
     at_gauss: Vec<[f64; 9]>,
-    parts: Vec<Part>,
-}
-
-/// One material in a cell.
-#[derive(Clone, Default)]
-struct Part {
-    volume: f64,
-    /// Sum of volume times reference coordinates; later the centroid.
-    moment: [f64; 2],
-    density: Fit,
+    /// Densities at the points of [`GAUSS_6X6`] of the cells cut by a straight line.
+    of_sides: Vec<Option<Box<[f64; SUBPOINTS]>>>,
+    centroids: Centroids,
+    /// Fits of the densities that the particles of each material carry.
+    fits: Vec<Fit>,
+    /// Density of each material of the cell.
+    densities: Vec<Option<Polynomial>>,
 }
 
 impl Density {
@@ -74,7 +67,10 @@ impl Density {
         Density {
             neighbours,
             at_gauss: vec![[0.0; 9]; mesh.cells()],
-            parts: vec![Part::default(); materials],
+            of_sides: vec![None; mesh.cells()],
+            centroids: Centroids::new(materials),
+            fits: vec![Fit::default(); materials],
+            densities: Vec::with_capacity(materials),
         }
     }
 
@@ -88,12 +84,23 @@ impl Density {
         quadrature: &Quadrature,
     ) {
         for cell in 0..mesh.cells() {
+            let kept = self.of_sides[cell].take();
             self.at_gauss[cell] = match quadrature.content(cell) {
                 Content::Uniform { material, .. } => [materials[material as usize].density; 9],
                 Content::Mixed => {
                     self.gather(mesh, cell, particles, materials);
                     self.help(mesh, cell, particles, materials);
-                    self.mixed(materials, quadrature.composition().factors())
+                    let viscosity = materials.iter().map(|m| m.viscosity);
+                    self.centroids.finish(quadrature.composition().factors(), viscosity);
+                    let fits = self.fits.iter();
+                    self.densities.clear();
+                    self.densities.extend(fits.map(|f| f.solve(Degree::Quadratic)));
+                    if let Some(line) = quadrature.cut(cell).and_then(|cut| cut.line.as_ref()) {
+                        let mut sides = kept.unwrap_or_else(|| Box::new([0.0; SUBPOINTS]));
+                        *sides = self.sides(line, materials);
+                        self.of_sides[cell] = Some(sides);
+                    }
+                    GAUSS_3X3.each_ref().map(|g| self.linear(g.r, materials))
                 }
                 Content::Solid | Content::Unknown => [0.0; 9],
             };
@@ -111,30 +118,30 @@ impl Density {
         [0, 1].map(|c| points().map(|(d, g)| 3.0 * d * g.weight * g.r[c]).sum())
     }
 
-    /// Calls `f` for each Gauss point with its mass divided by the volume of the cell, its
+    /// Calls `f` for each integration point with its mass divided by the volume of the cell, its
     /// reference coordinates and the shape functions.
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {
-        for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
-            f(g.weight * density, g.r, &g.shape.n);
+        let mut call = |density: &[f64], points: &[GaussPoint]| {
+            for (density, g) in density.iter().zip(points) {
+                f(g.weight * density, g.r, &g.shape.n);
+            }
+        };
+        match &self.of_sides[cell] {
+            Some(density) => call(&**density, &*GAUSS_6X6),
+            None => call(&self.at_gauss[cell], &*GAUSS_3X3),
         }
     }
 
     /// Sums the volumes and moments of the materials, and collects the points of the fits.
     fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
-        for part in &mut self.parts {
-            (part.volume, part.moment) = (0.0, [0.0; 2]);
-            part.density.clear();
-        }
+        self.centroids.clear();
+        self.fits.iter_mut().for_each(Fit::clear);
         for p in particles.of_cell(cell) {
             let m = particles.material[p] as usize;
-            let (volume, part) = (particles.volume[p], &mut self.parts[m]);
             let r = mesh.to_reference(cell, particles.position[p]);
-            part.volume += volume;
-            for c in 0..2 {
-                part.moment[c] += volume * r[c];
-            }
+            self.centroids.add(m, particles.volume[p], r);
             if let (Some(d), true) = (&particles.density, materials[m].carries_density) {
-                part.density.add(volume, r, d[p]);
+                self.fits[m].add(particles.volume[p], r, d[p]);
             }
         }
     }
@@ -142,53 +149,47 @@ impl Density {
     /// Adds particles of neighbouring cells to the fits of carried densities.
     fn help(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
         let Some(density) = &particles.density else { return };
-        for (m, part) in self.parts.iter_mut().enumerate() {
+        for (m, fit) in self.fits.iter_mut().enumerate() {
             if !materials[m].carries_density {
                 continue;
             }
             for p in self.neighbours.of(cell).flat_map(|n| particles.of_cell(n)) {
                 if particles.material[p] as usize == m {
                     let r = mesh.to_near_reference(cell, particles.position[p]);
-                    part.density.borrow(lent(r) * particles.volume[p], r, density[p]);
+                    fit.borrow(lent(r) * particles.volume[p], r, density[p]);
                 }
             }
         }
     }
 
-    /// Densities at the Gauss points of a mixed cell, after `gather` and `help`.
-    fn mixed(&mut self, materials: &[Material], factors: &[f64]) -> [f64; 9] {
-        let total: f64 = self.parts.iter().zip(factors).map(|(p, f)| p.volume * f).sum();
-        // Shares add up to one at every point only if the mean of the centroids is the centre of
-        // the cell. The centroids are shifted by the difference, those of materials that move
-        // easily most.
-        let (mut offset, mut give, mut held) = ([0.0; 2], 0.0, 0.0);
-        let stiffest = materials.iter().map(|m| m.viscosity).fold(0.0, f64::max);
-        for ((part, factor), material) in self.parts.iter_mut().zip(factors).zip(materials) {
-            if part.volume == 0.0 {
-                continue;
-            }
-            part.moment = part.moment.map(|m| m / part.volume);
-            let share = part.volume * factor / total;
-            give += share * stiffest / material.viscosity;
-            held += share * material.viscosity / stiffest;
-            for c in 0..2 {
-                offset[c] += share * part.moment[c];
-            }
-        }
-        let mut density = [0.0; 9];
-        for ((part, factor), material) in self.parts.iter().zip(factors).zip(materials) {
-            if part.volume == 0.0 {
-                continue;
-            }
-            let share = part.volume * factor / total;
-            let shifted = held + (1.0 - held) * stiffest / (material.viscosity * give);
-            let [x, y] = [0, 1].map(|c| 3.0 * (part.moment[c] - offset[c] * shifted));
-            let fit = part.density.solve(Degree::Quadratic);
-            for (density, g) in density.iter_mut().zip(GAUSS_3X3.iter()) {
-                let here = fit.as_ref().map_or(material.density, |f| f.at(g.r));
-                *density += share * (1.0 + x * g.r[0] + y * g.r[1]) * here;
+    /// Density of a material at a point of the cell, after its fits.
+    fn of_material(&self, m: usize, r: [f64; 2], materials: &[Material]) -> f64 {
+        self.densities[m].as_ref().map_or(materials[m].density, |f| f.at(r))
+    }
+
+    /// Density at a point of the cell for shares that vary linearly.
+    fn linear(&self, r: [f64; 2], materials: &[Material]) -> f64 {
+        let mut density = 0.0;
+        for m in 0..materials.len() {
+            let share = self.centroids.share(m);
+            if share > 0.0 {
+                let [x, y] = self.centroids.centroid(m).map(|c| 3.0 * c);
+                density += share * (1.0 + x * r[0] + y * r[1]) * self.of_material(m, r, materials);
             }
         }
         density
+    }
+
+    /// Densities of a cell cut by a line, at the points of [`GAUSS_6X6`].
+    fn sides(&self, line: &Line, materials: &[Material]) -> [f64; SUBPOINTS] {
+        let [a, b] = line.between;
+        let trust = line.cut.trust;
+        std::array::from_fn(|q| {
+            let (r, share) = (GAUSS_6X6[q].r, line.cut.share[q]);
+            let [first, second] = [a, b].map(|m| self.of_material(m, r, materials));
+            let sharp = first + share * (second - first);
+            let rest = if trust < 1.0 { (1.0 - trust) * self.linear(r, materials) } else { 0.0 };
+            trust * sharp + rest
+        })
     }
 }

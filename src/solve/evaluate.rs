@@ -3,8 +3,10 @@
 
 use super::element::{PointShape, rates};
 use super::laminate::{self, Cut};
-use super::points::{CutStiffness, IntegrationPoint};
+use super::points::{CutStiffness, IntegrationPoint, Line};
+use super::sides;
 use crate::composition::interface::Interface;
+use crate::composition::straight::StraightCut;
 use crate::composition::{Content, Gathered, Kind};
 use crate::laws::Here;
 use crate::laws::director::Orientation;
@@ -18,6 +20,9 @@ use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_6X6, SUBPOINTS, Shape};
 use crate::threads::Divisible;
+
+/// Relative difference up to which densities are equal.
+const SAME_DENSITY: f64 = 1e-12;
 
 /// Rates and pressure of the last iterate, for laws that depend on them.
 pub trait LastFlow: Sync {
@@ -59,6 +64,8 @@ pub struct Evaluation<'a> {
     pub factors: &'a [f64],
     /// Last iterate, for laws that depend on rates or pressure.
     pub flow: &'a dyn LastFlow,
+    /// Whether the materials have weight.
+    pub weight: bool,
 }
 
 /// Mutable data of consecutive cells.
@@ -120,13 +127,13 @@ impl CellsMut<'_> {
 }
 
 /// Arrangement of the materials of a cell.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is one at a time, and a box would be allocated"
-)]
 enum Form {
     /// Two materials separated by an interface.
     Cut { interface: Interface, between: [usize; 2] },
+    /// Two materials of different weight separated by a straight line.
+    Sides(Line),
+    /// Materials of different weight in no known arrangement.
+    Weights,
     /// Drops in a material of the viscosity `around`.
     Drops { around: f64 },
     /// No known arrangement.
@@ -168,29 +175,42 @@ impl Evaluation<'_> {
         };
         let mixture = match form {
             Form::Drops { around } => Mixture::around_drops(around),
+            Form::Sides(_) | Form::Weights => Mixture::parallel(),
             Form::Cut { .. } | Form::Mixture => Mixture::default(),
         };
         scratch.match_volumes(self.factors);
         self.points(cell, out, scratch, mixture);
-        if let Form::Cut { interface, between } = form {
-            let cut = self.laminate(cell, &interface, between, scratch);
-            // The two sides resist stretching in parallel, so the stiff side determines the scale
-            // of the penalty. With the mean of the mixture as this scale, layers of contrast 1e8 do
-            // not converge.
-            let arithmetic = self.arithmetic_viscosity(scratch);
-            *out.mean_viscosity = cut.rest * *out.mean_viscosity + (1.0 - cut.rest) * arithmetic;
-            *out.cut = Some(match kept {
-                Some(mut kept) => {
-                    *kept = cut;
-                    kept
-                }
-                None => Box::new(cut),
-            });
-        }
+        let cut = match form {
+            Form::Cut { interface, between } => {
+                let cut = self.laminate(cell, &interface, between, scratch);
+                // The two sides resist stretching in parallel, so the stiff side determines the
+                // scale of the penalty. With the mean of the mixture as this scale, layers of
+                // contrast 1e8 do not converge.
+                let arithmetic = self.arithmetic_viscosity(scratch);
+                *out.mean_viscosity =
+                    cut.rest * *out.mean_viscosity + (1.0 - cut.rest) * arithmetic;
+                cut
+            }
+            Form::Sides(line) => self.sides(cell, line, scratch),
+            Form::Weights | Form::Drops { .. } | Form::Mixture => return,
+        };
+        *out.cut = Some(match kept {
+            Some(mut kept) => {
+                *kept = cut;
+                kept
+            }
+            None => Box::new(cut),
+        });
     }
 
     /// Arrangement of the materials in a gathered cell.
     fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
+        if self.weight && self.densities_differ(scratch.volumes()) {
+            return match present(scratch.volumes()) {
+                Some(between) => self.line(between, scratch).map_or(Form::Weights, Form::Sides),
+                None => Form::Weights,
+            };
+        }
         let viscosity: [f64; 2] = match present(scratch.volumes()) {
             Some(between) => between.map(|m| self.viscosity_in_cell(cell, m, scratch)),
             None => return Form::Mixture,
@@ -209,6 +229,27 @@ impl Evaluation<'_> {
             Some(interface) => Form::Cut { interface, between },
             None => Form::Mixture,
         }
+    }
+
+    /// Whether the materials with a nonzero volume differ in density.
+    fn densities_differ(&self, volumes: &[f64]) -> bool {
+        let present = || volumes.iter().zip(self.materials).filter(|(v, _)| **v > 0.0);
+        let Some((_, first)) = present().next() else { return false };
+        present().skip(1).any(|(_, m)| {
+            m.carries_density
+                || first.carries_density
+                || (m.density - first.density).abs()
+                    > SAME_DENSITY * m.density.abs().max(first.density.abs())
+        })
+    }
+
+    /// The straight line between the two materials of a gathered cell.
+    fn line(&self, between: [usize; 2], scratch: &mut Gathered) -> Option<Line> {
+        let viscosity = self.materials.iter().map(|m| m.viscosity);
+        let centroids = scratch.centroids(self.factors, viscosity);
+        let second = between[1];
+        let cut = StraightCut::new(centroids.share(second), centroids.centroid(second))?;
+        Some(Line { between, cut })
     }
 
     /// Law of a material at a point of a cell.
@@ -244,7 +285,20 @@ impl Evaluation<'_> {
         let cut = Cut { interface, sides: &sides, cell: self.mesh.cell_measure(cell) };
         let mut matrix = laminate::matrix(&cut);
         matrix.iter_mut().flatten().for_each(|k| *k *= interface.trust);
-        CutStiffness { matrix, rest: 1.0 - interface.trust }
+        CutStiffness { matrix, rest: 1.0 - interface.trust, line: None }
+    }
+
+    /// Stiffness of a cell of two materials on either side of a line. Each has its law at the centre
+    /// of the cell.
+    fn sides(&self, cell: usize, line: Line, scratch: &Gathered) -> CutStiffness {
+        let laws = line.between.map(|m| {
+            let eta = self.viscosity(m, [0.0; 2], scratch);
+            self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m))
+        });
+        let trust = line.cut.trust;
+        let mut matrix = sides::matrix(&line.cut, &laws, self.mesh.cell_measure(cell));
+        matrix.iter_mut().flatten().for_each(|k| *k *= trust);
+        CutStiffness { matrix, rest: 1.0 - trust, line: Some(line) }
     }
 
     /// Mean viscosity of the law of one material at the centre of the cell.

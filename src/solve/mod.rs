@@ -13,6 +13,7 @@ mod problem;
 pub mod quadrature;
 pub mod report;
 mod residual;
+pub mod sides;
 pub mod stokes;
 pub mod symbolic;
 pub mod terms;

@@ -12,6 +12,11 @@
 //! than a cell is a laminate with straight edges; the cells of a drop are a dilute suspension.
 //! Rotation, density and images are those of the mixture.
 //!
+//! Cells whose materials differ in weight are treated differently: where a straight line separates
+//! two materials, each side has its own law ([`sides`](super::sides)), elsewhere the mean laws are
+//! arithmetic. A series arrangement would take the stiffness from a cell that is mostly heavy, and
+//! its weight would slide on the thin material.
+//!
 //! **Particles**. Each particle is an integration point with its own law and a weight proportional
 //! to its volume: the method of the source paper, for comparison.
 
@@ -32,6 +37,8 @@ const GRAIN: usize = 32;
 /// Integration points of all cells, and means that the solver needs.
 pub struct Quadrature {
     rule: Rule,
+    /// Whether the materials have weight.
+    weight: bool,
     composition: Composition,
     kinds: Vec<Kind>,
     /// Integration points, ordered by cell.
@@ -47,8 +54,9 @@ pub struct Quadrature {
 }
 
 impl Quadrature {
-    /// Creates the integration points of a mesh; no law is evaluated yet.
-    pub fn new(mesh: &Mesh, rule: Rule, materials: usize) -> Self {
+    /// Creates the integration points of a mesh; no law is evaluated yet. `weight` tells whether the
+    /// materials have weight.
+    pub fn new(mesh: &Mesh, rule: Rule, materials: usize, weight: bool) -> Self {
         let cells = mesh.cells();
         let (points, start) = match rule {
             Rule::Mixture | Rule::Laminate => {
@@ -63,6 +71,7 @@ impl Quadrature {
         };
         Quadrature {
             rule,
+            weight,
             composition: Composition::new(cells, materials),
             kinds: Vec::with_capacity(materials),
             points,
@@ -80,7 +89,7 @@ impl Quadrature {
         materials: usize,
         mut at: impl FnMut(usize, [f64; 2]) -> (PointLaw, f64, f64),
     ) -> Self {
-        let mut out = Quadrature::new(mesh, Rule::Mixture, materials);
+        let mut out = Quadrature::new(mesh, Rule::Mixture, materials, false);
         for cell in 0..mesh.cells() {
             if mesh.solid[cell] {
                 out.composition.set_content(cell, Content::Solid);
@@ -176,7 +185,15 @@ impl Quadrature {
             return Ok(());
         }
         let Quadrature {
-            rule, composition, kinds, points, cut, mean_viscosity, compliance, ..
+            rule,
+            weight,
+            composition,
+            kinds,
+            points,
+            cut,
+            mean_viscosity,
+            compliance,
+            ..
         } = self;
         // The volume fractions are written while the rest of the composition is read.
         let mut fractions = std::mem::take(&mut composition.fractions);
@@ -189,6 +206,7 @@ impl Quadrature {
             content: composition.contents(),
             factors: composition.factors(),
             flow,
+            weight: *weight,
         };
         let cells = CellsMut {
             materials: materials.len(),

@@ -93,21 +93,25 @@ pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
 /// Number of points of [`GAUSS_6X6`].
 pub const SUBPOINTS: usize = 36;
 
-/// Abscissae and weights (adding up to one half) of the positive half of the six-point rule.
-const GAUSS_6: [(f64, f64); 3] = [
-    (0.238_619_186_083_196_9, 0.233_956_967_286_345_5),
-    (0.661_209_386_466_264_5, 0.180_380_786_524_069_3),
-    (0.932_469_514_203_152, 0.085_662_246_189_585_2),
-];
+/// Six-point Gauss rule `(abscissa, weight)` on `[-1, 1]` with weights that add up to 1, ascending.
+pub const GAUSS_6: [(f64, f64); 6] = {
+    const A: [f64; 3] = [0.238_619_186_083_196_9, 0.661_209_386_466_264_5, 0.932_469_514_203_152];
+    const W: [f64; 3] = [0.233_956_967_286_345_5, 0.180_380_786_524_069_3, 0.085_662_246_189_585_2];
+    [(-A[2], W[2]), (-A[1], W[1]), (-A[0], W[0]), (A[0], W[0]), (A[1], W[1]), (A[2], W[2])]
+};
+
+/// The six Lagrange polynomials of the points of [`GAUSS_6`] at `t`.
+pub fn lagrange_6(t: f64) -> [f64; 6] {
+    std::array::from_fn(|i| {
+        let others = (0..6).filter(|&k| k != i);
+        others.map(|k| (t - GAUSS_6[k].0) / (GAUSS_6[i].0 - GAUSS_6[k].0)).product()
+    })
+}
 
 /// Points of the 6 x 6 Gauss rule, used for cells that contain an interface.
 pub static GAUSS_6X6: LazyLock<[GaussPoint; SUBPOINTS]> = LazyLock::new(|| {
-    let point = |k: usize| {
-        let (x, w) = GAUSS_6[if k < 3 { 2 - k } else { k - 3 }];
-        (if k < 3 { -x } else { x }, w)
-    };
     std::array::from_fn(|g| {
-        let ((x, wx), (y, wy)) = (point(g % 6), point(g / 6));
+        let ((x, wx), (y, wy)) = (GAUSS_6[g % 6], GAUSS_6[g / 6]);
         GaussPoint { r: [x, y], weight: wx * wy, shape: Shape::at([x, y]) }
     })
 });

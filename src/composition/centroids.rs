@@ -1,0 +1,98 @@
+//! This module computes the volumes and centroids of the materials of one cell.
+//!
+//! The centroid of all particles of a cell should be its centre. As particles slide past one
+//! another it is not, until some cross a face. The centroids are shifted to compensate, those of
+//! materials that move easily more than those of stiff ones,
+//!
+//! ```text
+//! X_m - o w_m,   o = sum s_m X_m
+//! w_m = b + (1 - b) (1/eta_m) / sum s_k/eta_k,   b = sum s_k eta_k/eta_max
+//! ```
+//! where `s_m` is the share and `X_m` the centroid of material `m`. With equal shifts, thin fluid
+//! that slides along the interface of a stiff fluid seems to tilt it, and the tilt makes the thin
+//! fluid slide: at a contrast of 1e6, the speed of a fluid at rest (rounding) doubled with every
+//! step. In cells nearly full of the stiff fluid, `b` keeps the shifts nearly equal: there the slip
+//! of the thin fluid has little effect, and a shift of the stiff fluid would affect all.
+
+/// Volumes and centroids of the materials of a cell.
+#[derive(Default)]
+pub struct Centroids {
+    parts: Vec<Part>,
+}
+
+/// One material in the cell.
+#[derive(Clone, Default)]
+struct Part {
+    /// Volume of its particles; later its share of the cell.
+    volume: f64,
+    /// Sum of volume times reference coordinates; later the shifted centroid.
+    moment: [f64; 2],
+}
+
+impl Centroids {
+    /// Centroids of a number of materials, without particles.
+    pub fn new(materials: usize) -> Self {
+        Centroids { parts: vec![Part::default(); materials] }
+    }
+
+    /// Allocates memory for a number of materials.
+    pub fn prepare(&mut self, materials: usize) {
+        self.parts.resize(materials, Part::default());
+    }
+
+    /// Removes all particles.
+    pub fn clear(&mut self) {
+        self.parts.fill(Part::default());
+    }
+
+    /// Adds a particle of material `m` at the reference coordinates `r`.
+    pub fn add(&mut self, m: usize, volume: f64, r: [f64; 2]) {
+        let part = &mut self.parts[m];
+        part.volume += volume;
+        for c in 0..2 {
+            part.moment[c] += volume * r[c];
+        }
+    }
+
+    /// Computes the shares and the shifted centroids, after all particles are added. The volume of
+    /// each material is multiplied by its factor; `viscosity` yields that of each material of the
+    /// scene.
+    pub fn finish(&mut self, factors: &[f64], viscosity: impl Iterator<Item = f64> + Clone) {
+        let total: f64 = self.parts.iter().zip(factors).map(|(p, f)| p.volume * f).sum();
+        let (mut offset, mut give, mut held) = ([0.0; 2], 0.0, 0.0);
+        let stiffest = viscosity.clone().fold(0.0, f64::max);
+        for ((part, factor), viscosity) in self.parts.iter_mut().zip(factors).zip(viscosity.clone())
+        {
+            if part.volume == 0.0 {
+                continue;
+            }
+            part.moment = part.moment.map(|m| m / part.volume);
+            let share = part.volume * factor / total;
+            give += share * stiffest / viscosity;
+            held += share * viscosity / stiffest;
+            for c in 0..2 {
+                offset[c] += share * part.moment[c];
+            }
+        }
+        for ((part, factor), viscosity) in self.parts.iter_mut().zip(factors).zip(viscosity) {
+            if part.volume == 0.0 {
+                continue;
+            }
+            part.volume = part.volume * factor / total;
+            let shifted = held + (1.0 - held) * stiffest / (viscosity * give);
+            for c in 0..2 {
+                part.moment[c] -= offset[c] * shifted;
+            }
+        }
+    }
+
+    /// Share of a material in the cell, after [`Centroids::finish`].
+    pub fn share(&self, m: usize) -> f64 {
+        self.parts[m].volume
+    }
+
+    /// Shifted centroid of a material of the cell, after [`Centroids::finish`].
+    pub fn centroid(&self, m: usize) -> [f64; 2] {
+        self.parts[m].moment
+    }
+}
