@@ -27,6 +27,8 @@ pub struct StraightCut {
     /// them the rule integrates polynomials of degree five in each coordinate exactly over the
     /// material's side; single shares may be negative or larger than one.
     pub share: [f64; SUBPOINTS],
+    /// The line `l[0] + l[1] xi + l[2] eta = 0`; the material is on the negative side.
+    pub line: [f64; 3],
     /// 1 if the material certainly lies on one side of the line, 0 if it does not.
     pub trust: f64,
 }
@@ -41,6 +43,7 @@ impl StraightCut {
         let rest = 1.0 - share;
         let mut cut = Self::of_lesser(rest, centroid.map(|c| -c * share / rest))?;
         cut.share.iter_mut().for_each(|s| *s = 1.0 - *s);
+        cut.line = cut.line.map(|l| -l);
         Some(cut)
     }
 
@@ -65,7 +68,12 @@ impl StraightCut {
             let at = [index(point % 6, centroid[0]), index(point / 6, centroid[1])];
             weights[at[along]][at[1 - along]]
         });
-        Some(StraightCut { share, trust })
+        // y - height(x) with x = 1 - sign xi and y = 1 - sign eta, or the other way round.
+        let slope = (side.height[1] - side.height[0]) / side.width;
+        let mut line = [1.0 - side.height[0] - slope, 0.0, 0.0];
+        line[1 + along] = -centroid[along].signum();
+        line[2 - along] = slope * centroid[1 - along].signum();
+        Some(StraightCut { share, line, trust })
     }
 }
 
@@ -172,6 +180,10 @@ mod tests {
                 let [found, truth] = [moment(&cut, powers), exact(n, c, powers)];
                 assert!((found - truth).abs() < 1e-6, "{n:?} {c} {powers:?}: {found} {truth}");
             }
+            let [l, x, y] = cut.line;
+            let length = x.hypot(y);
+            let found = [-x / length - n[0], -y / length - n[1], l / length - c];
+            assert!(found.iter().all(|d| d.abs() < 1e-4), "{n:?} {c}: {:?}", cut.line);
         }
     }
 

@@ -331,6 +331,10 @@ impl Plan {
         );
         let rule = match self.method.quadrature {
             Quadrature::Laminate => "\"laminate\": a laminate along the interface",
+            Quadrature::Sides => {
+                "\"sides\": each material on its side of a line if their weights differ, a laminate \
+                 otherwise"
+            }
             Quadrature::Mixture => "\"mixture\": a harmonic mixture",
             Quadrature::Particles => "\"particles\": each particle by itself, as in the source",
         };

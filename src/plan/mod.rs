@@ -294,6 +294,15 @@ impl Plan {
         self.effects.gravity || self.acceleration.is_some()
     }
 
+    /// Rule for the integration points of cells. Without weight, [`Quadrature::Sides`] is
+    /// [`Quadrature::Laminate`].
+    pub fn rule_of_cells(&self) -> Quadrature {
+        match self.method.quadrature {
+            Quadrature::Sides if !self.has_weight() => Quadrature::Laminate,
+            rule => rule,
+        }
+    }
+
     /// Index of the background material, which fills the part of the domain outside all regions.
     pub fn background(&self) -> Option<u8> {
         self.state.materials.iter().position(|m| m.background).map(|m| m as u8)

@@ -1,7 +1,7 @@
 //! This module builds `summary.json`: the settings, results and diagnostics of a run.
 
 use super::logger::Traffic;
-use crate::scene::scene_hash;
+use crate::scene::{Quadrature, scene_hash};
 use crate::sim::Run;
 use crate::sim::phases::Phases;
 use crate::sim::row::{GaugeRow, Row};
@@ -214,7 +214,34 @@ impl Tally {
     }
 }
 
+/// Largest energy error without a warning.
+const ENERGY_TOLERANCE: f64 = 0.02;
+/// Smallest number of steps for a warning of the energy: the energy of a few steps is uncertain.
+const ENERGY_STEPS: u64 = 10;
+
 impl Summary {
+    /// The warning that the energy lost is not the energy dissipated, with the likely cause for the
+    /// quadrature rule of the run; `None` if the two agree.
+    pub fn energy_warning(&self, rule: Quadrature) -> Option<String> {
+        let error = self.balances.energy_error.filter(|e| e.abs() > ENERGY_TOLERANCE)?;
+        if self.steps < ENERGY_STEPS {
+            return None;
+        }
+        let remedy = match rule {
+            Quadrature::Sides => "raise accuracy.cells or lower time.courant",
+            Quadrature::Laminate | Quadrature::Mixture | Quadrature::Particles => {
+                "if a heavy material has a sloping surface under a thinner fluid, set \
+                 accuracy.quadrature = \"sides\"; otherwise raise accuracy.cells or lower \
+                 time.courant"
+            }
+        };
+        let percent = 100.0 * error.abs();
+        Some(format!(
+            "the energy lost differs from the energy dissipated by {percent:.0} % of the latter: the \
+             flow is less accurate than that; {remedy}"
+        ))
+    }
+
     /// Writes `summary.json` into a folder, and returns its text.
     ///
     /// # Errors

@@ -599,6 +599,10 @@ pub enum Quadrature {
     /// Like `mixture`, but in cells that contain an interface of two materials, shear along the
     /// interface is in series and stretch along it in parallel.
     Laminate,
+    /// Like `laminate`, but where materials of different weight share a cell, each has its own
+    /// stiffness and weight on its side of a straight line. For free surfaces of heavy material under
+    /// a fluid more than a thousand times thinner.
+    Sides,
     /// Particles as the only integration points: the method of the source.
     Particles,
 }

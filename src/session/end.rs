@@ -125,6 +125,12 @@ impl Session {
             (Ok(Ending::Interrupted), None) => Some(SessionError::Interrupted),
             (Ok(_), None) => None,
         };
+        if let Some(w) = summary.energy_warning(self.drive.plan.method.quadrature) {
+            if !self.quiet {
+                tell(format_args!("warning: {w}"));
+            }
+            summary.warnings.push(w);
+        }
         summary.error = failure.as_ref().and_then(SessionError::describe);
         let json = summary.write(&self.folder).map_err(SessionError::Environment)?;
         let plotted = self.plot();

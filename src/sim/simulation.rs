@@ -101,12 +101,7 @@ impl<const D: usize> Simulation<D> {
         let particles = initial::particles(&plan)?;
         let fixed_load = plan.fixed_loads::<D>();
         let mut sim = Simulation {
-            quadrature: Quadrature::new(
-                &mesh,
-                plan.method.quadrature,
-                plan.state.materials.len(),
-                plan.has_weight(),
-            ),
+            quadrature: Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len()),
             terms: Terms::of(&plan),
             restoring_faces: if plan.method.stabilisation.is_some() {
                 open_faces(&mesh, &plan.enclosure)

@@ -24,8 +24,8 @@
 //! `rho_m` is a quadratic fit if particles carry their density. Particles of neighbouring cells
 //! contribute to the fit with a small weight.
 
-use super::points::Line;
 use super::quadrature::Quadrature;
+use super::sides::Sides;
 use crate::composition::Content;
 use crate::composition::centroids::Centroids;
 use crate::plan::material::Material;
@@ -33,7 +33,7 @@ use crate::space::fit::{Degree, Fit, Polynomial};
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
-use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, GaussPoint, SUBPOINTS};
+use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
 
 /// Weight per volume of a neighbour's particle in a fit, relative to the cell's own particles, by
 /// its reference coordinates.
@@ -52,13 +52,34 @@ pub struct Density {
     neighbours: Neighbours,
     /// Linear densities at the points of [`GAUSS_3X3`].
     at_gauss: Vec<[f64; 9]>,
-    /// Densities at the points of [`GAUSS_6X6`] of the cells cut by a straight line.
-    of_sides: Vec<Option<Box<[f64; SUBPOINTS]>>>,
+    /// Densities of the cells cut by a straight line.
+    of_sides: Vec<Option<Box<SideDensities>>>,
     centroids: Centroids,
     /// Fits of the densities that the particles of each material carry.
     fits: Vec<Fit>,
     /// Density of each material of the cell.
     densities: Vec<Option<Polynomial>>,
+}
+
+/// Densities of a cell cut by a straight line, at the points of [`GAUSS_6X6`].
+#[derive(Clone)]
+struct SideDensities {
+    /// Density.
+    density: [f64; SUBPOINTS],
+    /// Density times the function `psi` of the kink of the velocity.
+    kinked: [f64; SUBPOINTS],
+}
+
+/// An integration point of the weight.
+pub struct MassPoint<'a> {
+    /// Mass divided by the volume of the cell.
+    pub mass: f64,
+    /// The mass times the function `psi` of the kink of the velocity.
+    pub kinked: f64,
+    /// Reference coordinates.
+    pub r: [f64; 2],
+    /// Values of the shape functions.
+    pub n: &'a [f64; NODES],
 }
 
 impl Density {
@@ -95,10 +116,15 @@ impl Density {
                     let fits = self.fits.iter();
                     self.densities.clear();
                     self.densities.extend(fits.map(|f| f.solve(Degree::Quadratic)));
-                    if let Some(line) = quadrature.cut(cell).and_then(|cut| cut.line.as_ref()) {
-                        let mut sides = kept.unwrap_or_else(|| Box::new([0.0; SUBPOINTS]));
-                        *sides = self.sides(line, materials);
-                        self.of_sides[cell] = Some(sides);
+                    if let Some(sides) = quadrature.cut(cell).and_then(|cut| cut.sides.as_ref()) {
+                        let densities = self.sides(sides, materials);
+                        self.of_sides[cell] = Some(match kept {
+                            Some(mut kept) => {
+                                *kept = densities;
+                                kept
+                            }
+                            None => Box::new(densities),
+                        });
                     }
                     GAUSS_3X3.each_ref().map(|g| self.linear(g.r, materials))
                 }
@@ -118,17 +144,18 @@ impl Density {
         [0, 1].map(|c| points().map(|(d, g)| 3.0 * d * g.weight * g.r[c]).sum())
     }
 
-    /// Calls `f` for each integration point with its mass divided by the volume of the cell, its
-    /// reference coordinates and the shape functions.
-    pub fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {
-        let mut call = |density: &[f64], points: &[GaussPoint]| {
-            for (density, g) in density.iter().zip(points) {
-                f(g.weight * density, g.r, &g.shape.n);
+    /// Calls `f` for each integration point.
+    pub fn for_points(&self, cell: usize, mut f: impl FnMut(MassPoint)) {
+        if let Some(sides) = &self.of_sides[cell] {
+            let densities = sides.density.iter().zip(&sides.kinked);
+            for ((density, kinked), g) in densities.zip(GAUSS_6X6.iter()) {
+                let [mass, kinked] = [density, kinked].map(|d| g.weight * d);
+                f(MassPoint { mass, kinked, r: g.r, n: &g.shape.n });
             }
-        };
-        match &self.of_sides[cell] {
-            Some(density) => call(&**density, &*GAUSS_6X6),
-            None => call(&self.at_gauss[cell], &*GAUSS_3X3),
+        } else {
+            for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
+                f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
+            }
         }
     }
 
@@ -180,16 +207,19 @@ impl Density {
         density
     }
 
-    /// Densities of a cell cut by a line, at the points of [`GAUSS_6X6`].
-    fn sides(&self, line: &Line, materials: &[Material]) -> [f64; SUBPOINTS] {
-        let [a, b] = line.between;
-        let trust = line.cut.trust;
-        std::array::from_fn(|q| {
-            let (r, share) = (GAUSS_6X6[q].r, line.cut.share[q]);
-            let [first, second] = [a, b].map(|m| self.of_material(m, r, materials));
-            let sharp = first + share * (second - first);
-            let rest = if trust < 1.0 { (1.0 - trust) * self.linear(r, materials) } else { 0.0 };
-            trust * sharp + rest
-        })
+    /// Densities of a cell cut by a line.
+    fn sides(&self, sides: &Sides, materials: &[Material]) -> SideDensities {
+        let trust = sides.cut.trust;
+        let mut out = SideDensities { density: [0.0; SUBPOINTS], kinked: [0.0; SUBPOINTS] };
+        for (q, g) in GAUSS_6X6.iter().enumerate() {
+            let share = sides.cut.share[q];
+            let of = sides.between.map(|m| self.of_material(m, g.r, materials));
+            let mass = [(1.0 - share) * of[0], share * of[1]];
+            let psi = sides.kink.values(g);
+            let rest = if trust < 1.0 { (1.0 - trust) * self.linear(g.r, materials) } else { 0.0 };
+            out.density[q] = trust * (mass[0] + mass[1]) + rest;
+            out.kinked[q] = trust * (mass[0] * psi[0] + mass[1] * psi[1]);
+        }
+        out
     }
 }

@@ -3,8 +3,8 @@
 
 use super::element::{PointShape, rates};
 use super::laminate::{self, Cut};
-use super::points::{CutStiffness, IntegrationPoint, Line};
-use super::sides;
+use super::points::{CutStiffness, IntegrationPoint};
+use super::sides::{self, Sides};
 use crate::composition::interface::Interface;
 use crate::composition::straight::StraightCut;
 use crate::composition::{Content, Gathered, Kind};
@@ -64,8 +64,6 @@ pub struct Evaluation<'a> {
     pub factors: &'a [f64],
     /// Last iterate, for laws that depend on rates or pressure.
     pub flow: &'a dyn LastFlow,
-    /// Whether the materials have weight.
-    pub weight: bool,
 }
 
 /// Mutable data of consecutive cells.
@@ -131,7 +129,7 @@ enum Form {
     /// Two materials separated by an interface.
     Cut { interface: Interface, between: [usize; 2] },
     /// Two materials of different weight separated by a straight line.
-    Sides(Line),
+    Sides { cut: StraightCut, between: [usize; 2] },
     /// Materials of different weight in no known arrangement.
     Weights,
     /// Drops in a material of the viscosity `around`.
@@ -170,12 +168,12 @@ impl Evaluation<'_> {
         scratch.gather(self.mesh, cell, self.particles, self.kinds);
         scratch.fit_viscosities();
         let form = match self.rule {
-            Rule::Laminate => self.form(cell, scratch),
+            Rule::Laminate | Rule::Sides => self.form(cell, scratch),
             Rule::Mixture | Rule::Particles => Form::Mixture,
         };
         let mixture = match form {
             Form::Drops { around } => Mixture::around_drops(around),
-            Form::Sides(_) | Form::Weights => Mixture::parallel(),
+            Form::Sides { .. } | Form::Weights => Mixture::parallel(),
             Form::Cut { .. } | Form::Mixture => Mixture::default(),
         };
         scratch.match_volumes(self.factors);
@@ -191,7 +189,7 @@ impl Evaluation<'_> {
                     cut.rest * *out.mean_viscosity + (1.0 - cut.rest) * arithmetic;
                 cut
             }
-            Form::Sides(line) => self.sides(cell, line, scratch),
+            Form::Sides { cut, between } => self.sides(cell, cut, between, scratch),
             Form::Weights | Form::Drops { .. } | Form::Mixture => return,
         };
         *out.cut = Some(match kept {
@@ -205,9 +203,11 @@ impl Evaluation<'_> {
 
     /// Arrangement of the materials in a gathered cell.
     fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
-        if self.weight && self.densities_differ(scratch.volumes()) {
-            return match present(scratch.volumes()) {
-                Some(between) => self.line(between, scratch).map_or(Form::Weights, Form::Sides),
+        if self.rule == Rule::Sides && self.densities_differ(scratch.volumes()) {
+            let between = present(scratch.volumes());
+            let cut = between.and_then(|b| Some((self.straight_cut(b, scratch)?, b)));
+            return match cut {
+                Some((cut, between)) => Form::Sides { cut, between },
                 None => Form::Weights,
             };
         }
@@ -244,12 +244,10 @@ impl Evaluation<'_> {
     }
 
     /// The straight line between the two materials of a gathered cell.
-    fn line(&self, between: [usize; 2], scratch: &mut Gathered) -> Option<Line> {
+    fn straight_cut(&self, [_, b]: [usize; 2], scratch: &mut Gathered) -> Option<StraightCut> {
         let viscosity = self.materials.iter().map(|m| m.viscosity);
         let centroids = scratch.centroids(self.factors, viscosity);
-        let second = between[1];
-        let cut = StraightCut::new(centroids.share(second), centroids.centroid(second))?;
-        Some(Line { between, cut })
+        StraightCut::new(centroids.share(b), centroids.centroid(b))
     }
 
     /// Law of a material at a point of a cell.
@@ -285,20 +283,25 @@ impl Evaluation<'_> {
         let cut = Cut { interface, sides: &sides, cell: self.mesh.cell_measure(cell) };
         let mut matrix = laminate::matrix(&cut);
         matrix.iter_mut().flatten().for_each(|k| *k *= interface.trust);
-        CutStiffness { matrix, rest: 1.0 - interface.trust, line: None }
+        CutStiffness { matrix, rest: 1.0 - interface.trust, sides: None }
     }
 
     /// Stiffness of a cell of two materials on either side of a line. Each has its law at the centre
     /// of the cell.
-    fn sides(&self, cell: usize, line: Line, scratch: &Gathered) -> CutStiffness {
-        let laws = line.between.map(|m| {
+    fn sides(
+        &self,
+        cell: usize,
+        cut: StraightCut,
+        between: [usize; 2],
+        scratch: &Gathered,
+    ) -> CutStiffness {
+        let laws = between.map(|m| {
             let eta = self.viscosity(m, [0.0; 2], scratch);
             self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m))
         });
-        let trust = line.cut.trust;
-        let mut matrix = sides::matrix(&line.cut, &laws, self.mesh.cell_measure(cell));
-        matrix.iter_mut().flatten().for_each(|k| *k *= trust);
-        CutStiffness { matrix, rest: 1.0 - trust, line: Some(line) }
+        let (mut matrix, kink) = sides::matrix(&cut, &laws, self.mesh.cell_measure(cell));
+        matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);
+        CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kink }) }
     }
 
     /// Mean viscosity of the law of one material at the centre of the cell.

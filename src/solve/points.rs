@@ -1,7 +1,7 @@
 //! This module defines integration points and the stiffness of cells cut by an interface.
 
 use super::laminate::VelocityMatrix;
-use crate::composition::straight::StraightCut;
+use super::sides::Sides;
 use crate::laws::point::PointLaw;
 
 /// One integration point of a cell.
@@ -18,15 +18,6 @@ pub struct IntegrationPoint {
     pub r: [f64; 2],
 }
 
-/// A straight line that separates two materials of different density in a cell.
-#[derive(Clone)]
-pub struct Line {
-    /// Indices of the two materials.
-    pub between: [usize; 2],
-    /// The line, with the shares of the second material.
-    pub cut: StraightCut,
-}
-
 /// Viscous stiffness of a cell cut by an interface.
 #[derive(Clone)]
 pub struct CutStiffness {
@@ -34,7 +25,7 @@ pub struct CutStiffness {
     pub matrix: VelocityMatrix,
     /// Fraction of the viscosity that remains at the integration points.
     pub rest: f64,
-    /// The line on whose sides each material has its own stiffness and weight; `None` if the cell is
+    /// The line on either side of which each material has its own stiffness and weight; `None` if the cell is
     /// a laminate.
-    pub line: Option<Line>,
+    pub sides: Option<Sides>,
 }

@@ -12,10 +12,10 @@
 //! than a cell is a laminate with straight edges; the cells of a drop are a dilute suspension.
 //! Rotation, density and images are those of the mixture.
 //!
-//! Cells whose materials differ in weight are treated differently: where a straight line separates
-//! two materials, each side has its own law ([`sides`](super::sides)), elsewhere the mean laws are
-//! arithmetic. A series arrangement would take the stiffness from a cell that is mostly heavy, and
-//! its weight would slide on the thin material.
+//! **Sides**. As the laminate, but cells whose materials differ in density are treated differently:
+//! where a straight line separates two materials, each side has its own law and its own weight
+//! ([`sides`](super::sides)), elsewhere the mean laws are arithmetic. A series arrangement takes the
+//! stiffness from a cell that is mostly heavy, and its weight slides on the thin material.
 //!
 //! **Particles**. Each particle is an integration point with its own law and a weight proportional
 //! to its volume: the method of the source paper, for comparison.
@@ -37,8 +37,6 @@ const GRAIN: usize = 32;
 /// Integration points of all cells, and means that the solver needs.
 pub struct Quadrature {
     rule: Rule,
-    /// Whether the materials have weight.
-    weight: bool,
     composition: Composition,
     kinds: Vec<Kind>,
     /// Integration points, ordered by cell.
@@ -54,12 +52,11 @@ pub struct Quadrature {
 }
 
 impl Quadrature {
-    /// Creates the integration points of a mesh; no law is evaluated yet. `weight` tells whether the
-    /// materials have weight.
-    pub fn new(mesh: &Mesh, rule: Rule, materials: usize, weight: bool) -> Self {
+    /// Creates the integration points of a mesh; no law is evaluated yet.
+    pub fn new(mesh: &Mesh, rule: Rule, materials: usize) -> Self {
         let cells = mesh.cells();
         let (points, start) = match rule {
-            Rule::Mixture | Rule::Laminate => {
+            Rule::Mixture | Rule::Laminate | Rule::Sides => {
                 let mut points = vec![IntegrationPoint::default(); 9 * cells];
                 for (k, point) in points.iter_mut().enumerate() {
                     let g = &GAUSS_3X3[k % 9];
@@ -71,7 +68,6 @@ impl Quadrature {
         };
         Quadrature {
             rule,
-            weight,
             composition: Composition::new(cells, materials),
             kinds: Vec::with_capacity(materials),
             points,
@@ -89,7 +85,7 @@ impl Quadrature {
         materials: usize,
         mut at: impl FnMut(usize, [f64; 2]) -> (PointLaw, f64, f64),
     ) -> Self {
-        let mut out = Quadrature::new(mesh, Rule::Mixture, materials, false);
+        let mut out = Quadrature::new(mesh, Rule::Mixture, materials);
         for cell in 0..mesh.cells() {
             if mesh.solid[cell] {
                 out.composition.set_content(cell, Content::Solid);
@@ -123,7 +119,9 @@ impl Quadrature {
     /// The nine points of a cell, row by row from below, if they are those of the Gauss rule.
     pub fn gauss_points(&self, cell: usize) -> Option<&[IntegrationPoint; 9]> {
         match self.rule {
-            Rule::Mixture | Rule::Laminate => self.points[9 * cell..9 * cell + 9].try_into().ok(),
+            Rule::Mixture | Rule::Laminate | Rule::Sides => {
+                self.points[9 * cell..9 * cell + 9].try_into().ok()
+            }
             Rule::Particles => None,
         }
     }
@@ -138,7 +136,7 @@ impl Quadrature {
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(&IntegrationPoint, &Shape)) {
         let range = self.start[cell] as usize..self.start[cell + 1] as usize;
         match self.rule {
-            Rule::Mixture | Rule::Laminate => {
+            Rule::Mixture | Rule::Laminate | Rule::Sides => {
                 for (p, g) in self.points[range].iter().zip(GAUSS_3X3.iter()) {
                     f(p, &g.shape);
                 }
@@ -185,15 +183,7 @@ impl Quadrature {
             return Ok(());
         }
         let Quadrature {
-            rule,
-            weight,
-            composition,
-            kinds,
-            points,
-            cut,
-            mean_viscosity,
-            compliance,
-            ..
+            rule, composition, kinds, points, cut, mean_viscosity, compliance, ..
         } = self;
         // The volume fractions are written while the rest of the composition is read.
         let mut fractions = std::mem::take(&mut composition.fractions);
@@ -206,7 +196,6 @@ impl Quadrature {
             content: composition.contents(),
             factors: composition.factors(),
             flow,
-            weight: *weight,
         };
         let cells = CellsMut {
             materials: materials.len(),

@@ -7,6 +7,7 @@
 mod corners;
 mod cut_cells;
 mod elements;
+mod free_surfaces;
 mod layers;
 mod rayleigh_taylor;
 mod report;
@@ -42,10 +43,11 @@ impl Effort {
 type Subject = fn(Effort) -> Result<Section, CaseError>;
 
 /// All subjects: name on the command line, and function.
-pub const SUBJECTS: [(&str, Subject); 9] = [
+pub const SUBJECTS: [(&str, Subject); 10] = [
     ("elements", elements::section),
     ("smooth", smooth::section),
     ("cut-cells", cut_cells::section),
+    ("free-surfaces", free_surfaces::section),
     ("transport", transport::section),
     ("rest", rest::section),
     ("rayleigh-taylor", rayleigh_taylor::section),

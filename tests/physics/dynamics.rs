@@ -258,3 +258,58 @@ fn cut_cosserat_drops_converge() {
         assert!((coarse / fine - 1.0).abs() < tolerance, "{viscosity}: {coarse} {fine}");
     }
 }
+
+/// A block of mud of 1 m in the corner of a box of air, up to `t = 2` s. With `turned`, the scene is
+/// turned by 90 degrees.
+fn slump(contrast: &str, turned: bool) -> Box<dyn Run> {
+    let [gravity, x, y] = if turned {
+        ["[10, 0]", "[-1.5, 0]", "[0, 4]"]
+    } else {
+        ["[0, -10]", "[0, 4]", "[0, 1.5]"]
+    };
+    let block = if turned { "x = [-1, 0], y = [0, 1]" } else { "x = [0, 1], y = [0, 1]" };
+    let text = format!(
+        "schema = 1\nname = \"slump\"\ngravity = {gravity}\n[domain]\nx = {x}\ny = {y}\n\
+         length_scale = 1\n[accuracy]\ncells = 8\nquadrature = \"sides\"\n\
+         placement = \"regular\"\n[time]\nend = 2\ncourant = 2\n[boundaries]\n\
+         left.kind = \"no_slip\"\nright.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
+         top.kind = \"no_slip\"\n[materials.mud]\ndensity = 1000\nshear_viscosity = 1000\n\
+         [materials.air]\nshear_viscosity = \"1000/{contrast}\"\n\
+         [[regions]]\nmaterial = \"air\"\n[[regions]]\nmaterial = \"mud\"\n\
+         shape.rectangle = {{ {block} }}\n"
+    );
+    scene(&text, &[])
+}
+
+#[test]
+fn a_slump_loses_the_energy_it_dissipates_at_any_contrast() {
+    let mut all = vec![];
+    for contrast in ["1e3", "1e4", "1e6", "1e8"] {
+        let mut run = slump(contrast, false);
+        let first = run.row().potential_energy;
+        finish(run.as_mut(), |_| {});
+        let row = run.row();
+        let lost = first - row.potential_energy;
+        println!("{contrast}: {} steps, {lost} lost, {} dissipated", row.step, row.dissipated);
+        assert!(
+            (lost / row.dissipated - 1.0).abs() < 0.02,
+            "{contrast}: {lost} {}",
+            row.dissipated
+        );
+        assert!(row.step < 100, "{contrast}: {} steps", row.step);
+        all.push(lost);
+    }
+    // The air has no influence.
+    assert!(all.iter().all(|lost| (lost / all[3] - 1.0).abs() < 0.01), "{all:?}");
+}
+
+#[test]
+fn a_turned_slump_is_the_same() {
+    let [mut upright, mut turned] = [false, true].map(|turned| slump("1e4", turned));
+    for _ in 0..5 {
+        upright.step().unwrap();
+        turned.step().unwrap();
+        let [a, b] = [upright.row(), turned.row()].map(|r| (r.dissipation, r.rms_speed));
+        assert!((a.0 / b.0 - 1.0).abs() < 1e-6 && (a.1 / b.1 - 1.0).abs() < 1e-6, "{a:?} {b:?}");
+    }
+}

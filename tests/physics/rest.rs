@@ -23,6 +23,24 @@ fn a_level_inside_a_cell_does_not_move() {
     }
 }
 
+#[test]
+fn a_level_between_sides_does_not_move_at_any_contrast() {
+    for placement in PLACEMENTS {
+        let placement = format!("accuracy.placement={placement}");
+        for contrast in ["contrast=1", "contrast=1e3", "contrast=1e8"] {
+            for level in ["level=0.52", "level=0.5137", "level=0.50001"] {
+                let sets = [&placement, level, contrast, "accuracy.quadrature=sides"];
+                let mut run = preset("hydrostatic", &sets);
+                for _ in 0..5 {
+                    run.step().unwrap();
+                }
+                let speed = run.row().max_speed / SCALE;
+                assert!(speed < 1e-8, "{placement}, {level}, {contrast}: {speed:e}");
+            }
+        }
+    }
+}
+
 /// Largest initial speed in a unit box, in units of [`SCALE`].
 fn speed(gravity: &str, cells: u32, placement: &str, rest: &str) -> f64 {
     let text = format!(

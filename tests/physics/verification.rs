@@ -26,6 +26,10 @@ fn cut_cells() {
     check("cut-cells");
 }
 #[test]
+fn free_surfaces() {
+    check("free-surfaces");
+}
+#[test]
 fn transport() {
     check("transport");
 }

@@ -6,14 +6,15 @@
 
 use crate::plan::Plan;
 use crate::scene::Quadrature as Rule;
-use crate::solve::density::Density;
+use crate::solve::density::{Density, MassPoint};
 use crate::solve::quadrature::Quadrature;
+use crate::solve::sides::Kink;
 
 /// Points at which the densities of a cell are known.
 #[derive(Clone, Copy)]
 pub enum Masses<'a> {
-    /// The Gauss points, with fitted densities.
-    Fitted(&'a Density),
+    /// Gauss points, with fitted densities, and the kinks of the velocity in cut cells.
+    Fitted(&'a Density, &'a Quadrature),
     /// The integration points, with their own densities.
     Points(&'a Quadrature),
 }
@@ -22,18 +23,37 @@ impl<'a> Masses<'a> {
     /// The masses that a quadrature rule integrates.
     pub fn of(rule: Rule, density: &'a Density, quadrature: &'a Quadrature) -> Self {
         match rule {
-            Rule::Mixture | Rule::Laminate => Masses::Fitted(density),
+            Rule::Mixture | Rule::Laminate | Rule::Sides => Masses::Fitted(density, quadrature),
             Rule::Particles => Masses::Points(quadrature),
         }
     }
 
-    /// Calls `f` for each point with its mass divided by the volume of the cell, its reference
-    /// coordinates and the shape functions.
-    fn for_points(&self, cell: usize, mut f: impl FnMut(f64, [f64; 2], &[f64; 9])) {
+    /// Calls `f` for each point of a cell.
+    fn for_points(&self, cell: usize, mut f: impl FnMut(MassPoint)) {
         match self {
-            Masses::Fitted(density) => density.for_points(cell, f),
-            Masses::Points(quadrature) => {
-                quadrature.for_points(cell, |p, shape| f(p.weight * p.density, p.r, &shape.n))
+            Masses::Fitted(density, _) => density.for_points(cell, f),
+            Masses::Points(quadrature) => quadrature.for_points(cell, |p, shape| {
+                f(MassPoint { mass: p.weight * p.density, kinked: 0.0, r: p.r, n: &shape.n })
+            }),
+        }
+    }
+
+    /// Kink of the velocity in a cell.
+    fn kink(&self, cell: usize) -> Option<&Kink> {
+        match self {
+            Masses::Fitted(_, quadrature) => {
+                quadrature.cut(cell)?.sides.as_ref().map(|sides| &sides.kink)
+            }
+            Masses::Points(_) => None,
+        }
+    }
+
+    /// Adds the force `force` on the kink of a cell to the forces on its nodes.
+    fn add_kinked(&self, cell: usize, force: [f64; 2], mut add: impl FnMut(usize, [f64; 2])) {
+        if let Some(kink) = self.kink(cell) {
+            let along = force[0] * kink.along[0] + force[1] * kink.along[1];
+            for (a, alpha) in kink.amplitude.iter().enumerate() {
+                add(a, alpha.map(|alpha| along * alpha));
             }
         }
     }
@@ -49,16 +69,22 @@ pub fn add_gravity<const D: usize>(
     let mesh = &plan.mesh;
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let volume = mesh.cell_volume(cell);
-        let mut mass = [0.0; 9];
-        masses.for_points(cell, |m, _, n| {
-            for (mass, n) in mass.iter_mut().zip(n) {
-                *mass += m * n;
+        let (mut mass, mut kinked) = ([0.0; 9], 0.0);
+        masses.for_points(cell, |p| {
+            for (mass, n) in mass.iter_mut().zip(p.n) {
+                *mass += p.mass * n;
             }
+            kinked += p.kinked;
         });
-        for (node, mass) in mesh.cell_nodes(cell).into_iter().zip(mass) {
+        let nodes = mesh.cell_nodes(cell);
+        for (node, mass) in nodes.into_iter().zip(mass) {
             load[node][0] += volume * mass * g[0];
             load[node][1] += volume * mass * g[1];
         }
+        masses.add_kinked(cell, g.map(|g| volume * kinked * g), |a, [x, y]| {
+            load[nodes[a]][0] += x;
+            load[nodes[a]][1] += y;
+        });
     }
 }
 
@@ -68,18 +94,26 @@ pub fn add_acceleration<const D: usize>(plan: &Plan, masses: Masses, load: &mut 
     let (mesh, unit) = (&plan.mesh, plan.units.acceleration());
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let volume = mesh.cell_volume(cell);
-        let mut force = [[0.0; 2]; 9];
-        masses.for_points(cell, |mass, r, n| {
-            let [x, y] = plan.si(mesh.from_reference(cell, r));
+        let (mut force, mut kinked) = ([[0.0; 2]; 9], [0.0; 2]);
+        masses.for_points(cell, |p| {
+            let [x, y] = plan.si(mesh.from_reference(cell, p.r));
             let a = acceleration.each_ref().map(|a| a.at(x, y));
-            for (force, n) in force.iter_mut().zip(n) {
-                force[0] += volume * mass * n * a[0] / unit;
-                force[1] += volume * mass * n * a[1] / unit;
+            for (force, n) in force.iter_mut().zip(p.n) {
+                force[0] += volume * p.mass * n * a[0] / unit;
+                force[1] += volume * p.mass * n * a[1] / unit;
+            }
+            for c in 0..2 {
+                kinked[c] += volume * p.kinked * a[c] / unit;
             }
         });
-        for (node, force) in mesh.cell_nodes(cell).into_iter().zip(force) {
+        let nodes = mesh.cell_nodes(cell);
+        for (node, force) in nodes.into_iter().zip(force) {
             load[node][0] += force[0];
             load[node][1] += force[1];
         }
+        masses.add_kinked(cell, kinked, |a, [x, y]| {
+            load[nodes[a]][0] += x;
+            load[nodes[a]][1] += y;
+        });
     }
 }
