@@ -27,7 +27,7 @@ fn a_level_inside_a_cell_does_not_move() {
 fn a_level_between_sides_does_not_move_at_any_contrast() {
     for placement in PLACEMENTS {
         let placement = format!("accuracy.placement={placement}");
-        for contrast in ["contrast=1", "contrast=1e3", "contrast=1e8"] {
+        for contrast in ["contrast=1", "contrast=1e3", "contrast=1e6"] {
             for level in ["level=0.52", "level=0.5137", "level=0.50001"] {
                 let sets = [&placement, level, contrast, "accuracy.quadrature=sides"];
                 let mut run = preset("hydrostatic", &sets);
