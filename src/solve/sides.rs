@@ -7,7 +7,7 @@
 //! The integrals are exact. For any line the matrix is therefore positive semi-definite, and a cell
 //! that is mostly filled by the stiff fluid keeps its stiffness.
 //!
-//! **Slip.** Where the viscosities differ, the true velocity along the line has a kink, which a
+//! **Kink.** Where the viscosities differ, the true velocity along the line has a kink, which a
 //! biquadratic velocity cannot have. The kink
 //!
 //! ```text
@@ -105,6 +105,9 @@ impl Kink {
         let [a, b] = laws.each_ref().map(|law| law.shear.mean());
         let decades = (a / b).log10().abs();
         let kept = ((KINKLESS - decades) / (KINKLESS - KINKED)).clamp(0.0, 1.0);
+        if kept == 0.0 {
+            return;
+        }
         let stiffer = usize::from(b > a);
         let difference = minus(&laws[stiffer], &laws[1 - stiffer]);
         // Products of the kink with the velocities, with the difference of the laws and with the
@@ -125,7 +128,7 @@ impl Kink {
                 }
             }
         }
-        if itself <= 0.0 || kept == 0.0 {
+        if itself <= 0.0 {
             return;
         }
         let alpha = driven.map(|d| -kept * d / itself);

@@ -3,7 +3,7 @@
 use super::{Expectation, Trial};
 use crate::cases::{
     Case, CaseError, Drive, Errors, Fluid, Inclined, SolCx, couette, coupled_cell,
-    inclined_pure_shear, inclined_shear, poiseuille, solcx, solvi, steady_vortex,
+    inclined_pure_shear, inclined_shear, poiseuille, solcx, solvi, start, steady_vortex,
     steady_vortex_without_particles,
 };
 use crate::scene::{SceneError, SceneSource, presets};
@@ -18,6 +18,7 @@ pub fn all() -> Result<Vec<Trial>, CaseError> {
     layers(&mut out);
     compressible(&mut out);
     boundaries(&mut out)?;
+    free_surfaces(&mut out);
     time_steps(&mut out)?;
     particles(&mut out)?;
     units(&mut out);
@@ -452,14 +453,54 @@ fn boundaries(out: &mut Vec<Trial>) -> Result<(), CaseError> {
                  [[walls]]\nname = \"sill\"\nkind = \"no_slip\"\nfrom = [0.6, 0.25]\nto = [0.9, 0.25]\n";
     let text = drop_scene(1.0, 10.0, "", 0.19) + solid;
     out.push(trial(GROUP, "a drop falls on a block and a wall", text, 100));
-    let mut silo = trial(GROUP, "silo at contrast 1e6, R = 10/3 a", String::new(), 30).long();
-    silo.scene = presets::find("silo")?.with_sets(&[
-        "accuracy.cells=4".into(),
-        "contrast=1e6".into(),
-        "alpha=10/3".into(),
-    ])?;
-    out.push(silo);
+    for (rule, of_rule) in [("laminate", ""), ("sides", ", between sides")] {
+        let name = format!("silo at contrast 1e6, R = 10/3 a{of_rule}");
+        let mut silo = trial(GROUP, name, String::new(), 30).long();
+        silo.scene = presets::find("silo")?.with_sets(&[
+            "accuracy.cells=4".into(),
+            "contrast=1e6".into(),
+            "alpha=10/3".into(),
+            format!("accuracy.quadrature={rule}"),
+        ])?;
+        out.push(silo);
+    }
     Ok(())
+}
+
+/// Heavy fluids with sloping surfaces under thin air, with the rule for them.
+fn free_surfaces(out: &mut Vec<Trial>) {
+    const GROUP: &str = "free surfaces";
+    // A box of 4 x 1.5 m with no slip on sides and floor.
+    let scene = |contrast: f64, mud: &str| {
+        format!(
+            "schema = 1\nname = \"mud\"\ngravity = [0, -10]\n[domain]\nx = [0, 4]\ny = [0, 1.5]\n\
+             length_scale = 1\n[accuracy]\ncells = 8\nquadrature = \"sides\"\n\
+             placement = \"jittered\"\n[time]\nend = 5\ncourant = 2\n[boundaries]\n\
+             left.kind = \"no_slip\"\nright.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
+             [materials.mud]\ndensity = 1000\nshear_viscosity = 1000\n\
+             [materials.air]\nshear_viscosity = \"1000/{contrast:e}\"\n\
+             [[regions]]\nmaterial = \"air\"\n[[regions]]\nmaterial = \"mud\"\n{mud}\n"
+        )
+    };
+    let mut add = |name: String, text: String| {
+        let source = SceneSource::new(name.clone(), text.clone());
+        out.push(trial(GROUP, name, text, 400).drifting().expecting(move |run| {
+            let lost = start(&source)?.row().potential_energy - run.row().potential_energy;
+            let error = (lost - run.row().dissipated).abs() / lost;
+            Ok(vec![Check::new("energy lost and dissipated", error, Bound::AtMost(0.05))])
+        }));
+    };
+    for power in [3, 4, 6, 8, 9] {
+        let mud = "shape.rectangle = { x = [0, 1], y = [0, 1] }";
+        add(format!("a block slumps, contrast 1e{power}"), scene(10f64.powi(power), mud));
+    }
+    let dome = "shape.circle = { centre = [2.03, 0], radius = 0.8 }";
+    add("a dome spreads, contrast 1e6".into(), scene(1e6, dome));
+    let tilted = "shape.where = \"y < 0.7 + 0.3*(x - 2)\"";
+    add("a tilted layer levels, contrast 1e6".into(), scene(1e6, tilted));
+    let drop = "shape.circle = { centre = [2.03, 1.02], radius = 0.3 }\n\
+                [[blocks]]\nname = \"ledge\"\nx = [1.5, 2.25]\ny = [0.5, 0.75]";
+    add("a drop on a ledge, contrast 1e6".into(), scene(1e6, drop));
 }
 
 /// Very small and very large time steps, and many steps.
