@@ -158,14 +158,19 @@ impl Browser {
     pub fn wait_for(&self, what: &str, condition: &str) -> Value {
         let clock = Instant::now();
         loop {
-            let value = self.script(&format!("return {condition}"), &[]);
-            if value != json!(false) && !value.is_null() {
+            // Parts of the page may be missing while it loads or restarts.
+            let script = format!(
+                "try {{ return {condition} }} catch (e) {{ return {{ missing: String(e) }} }}"
+            );
+            let value = self.script(&script, &[]);
+            if value != json!(false) && !value.is_null() && value["missing"].is_null() {
                 return value;
             }
             if clock.elapsed() > PATIENCE {
                 let focus =
                     self.script("return document.activeElement.outerHTML.slice(0, 80)", &[]);
-                panic!("no {what}: {condition}; focus on {focus}\n{}", self.text("main"));
+                let page = self.text("main");
+                panic!("no {what}: {condition} is {value}; focus on {focus}\n{page}");
             }
             std::thread::sleep(Duration::from_millis(100));
         }
