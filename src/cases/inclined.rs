@@ -1,5 +1,5 @@
-//! This module holds cases of two layers in uniform stress, whose interface is inclined to the
-//! mesh.
+//! This module holds cases of two layers, in simple and in pure shear, whose interface is inclined
+//! to the mesh.
 //!
 //! The interface passes through the centre of the unit box at an angle to the x axis. With unit
 //! vectors `t` along and `n` across it, and the distance `d` from it:

@@ -19,8 +19,9 @@ fn problem(scene: &Scene, preset: &Scene) -> String {
     to_toml(&s)
 }
 
-/// The exact solution of a scene if it is a preset with known solution, for any parameters and
-/// numerics. The solutions of `solcx` and `solvi` hold only at the start.
+/// The exact solution of a scene if it is a preset with known solution, for any numerics and
+/// parameters (`solvi` with its radius of 0.2 only). The solutions of `solcx` and `solvi` hold only
+/// at the start.
 pub fn exact_of(scene: &Scene) -> Option<Exact> {
     let source = presets::find(&scene.name).ok()?;
     let preset = parse(&source).ok()?;

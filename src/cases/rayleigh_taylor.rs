@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn turning_it_over_decays_at_the_same_rate() {
+    fn mirrored_layers_grow_at_the_same_rate() {
         let (up, down) = (rate(0.3, [2.0, 5.0], 1.1), rate(0.7, [5.0, 2.0], 1.1));
         assert!((up / down - 1.0).abs() < 1e-9, "{up} {down}");
     }

@@ -15,9 +15,9 @@ use crate::scene::SceneSource;
 /// A scene with a small inclusion whose contribution to the dissipation is known.
 pub struct Small {
     scene: SceneSource,
-    /// Dissipation without the inclusion, for `eta = 1`.
+    /// Dissipation outside a sheet, or without a drop, for `eta = 1`.
     matrix: f64,
-    /// Dissipation added by the inclusion, for `eta = 1`.
+    /// Dissipation inside a sheet, or added by a drop, for `eta = 1`.
     excess: f64,
 }
 

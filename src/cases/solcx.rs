@@ -94,7 +94,8 @@ impl Solution {
         let x = c.jump;
         demand(&[(0, x, [1.0, 0.0, 0.0, 0.0]), (1, x, [-1.0, 0.0, 0.0, 0.0])]);
         demand(&[(0, x, [0.0, 1.0, 0.0, 0.0]), (1, x, [0.0, -1.0, 0.0, 0.0])]);
-        // Shear stress: -eta (m U + U''/m). Normal stress: -P + 2 eta U' = eta (3 U' - U'''/m^2) + ...
+        // Shear stress: -eta (m U + U''/m).
+        // Normal stress: -P + 2 eta U' = eta (3 U' - U'''/m^2) + ...
         let top = viscosity[0].max(viscosity[1]);
         let [e0, e1] = viscosity.map(|v| v / top);
         demand(&[(0, x, [e0 * M, 0.0, e0 / M, 0.0]), (1, x, [-e1 * M, 0.0, -e1 / M, 0.0])]);

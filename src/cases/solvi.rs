@@ -6,7 +6,8 @@
 //!
 //! ```text
 //! inside    u + iv = 2 eta/(eta + eta_i) conj z,   p = 0
-//! outside   2 eta (u + iv) = a/z + a z/conj z^2 - a r^2/conj z^3 + 2 eta conj z,   p = 2 a Re 1/z^2
+//! outside   2 eta (u + iv) = a/z + a z/conj z^2 - a r^2/conj z^3 + 2 eta conj z,
+//!           p = 2 a Re 1/z^2
 //!           a = 2 eta r^2 (eta - eta_i)/(eta + eta_i)
 //! ```
 

@@ -8,11 +8,12 @@
 //! X_m - o w_m,   o = sum s_m X_m
 //! w_m = b + (1 - b) (1/eta_m) / sum s_k/eta_k,   b = sum s_k eta_k/eta_max
 //! ```
-//! where `s_m` is the share and `X_m` the centroid of material `m`. With equal shifts, thin fluid
-//! that slides along the interface of a stiff fluid seems to tilt it, and the tilt makes the thin
-//! fluid slide: at a contrast of 1e6, the speed of a fluid at rest (rounding) doubled with every
-//! step. In cells nearly full of the stiff fluid, `b` keeps the shifts nearly equal: there the slip
-//! of the thin fluid has little effect, and a shift of the stiff fluid would affect all.
+//! where `s_m` is the share and `X_m` the centroid of material `m`, and `eta_max` the largest
+//! viscosity of the scene. With equal shifts, thin fluid that slides along the interface of a stiff
+//! fluid seems to tilt it, and the tilt makes the thin fluid slide: at a contrast of 1e6, the speed
+//! of a fluid at rest (rounding) doubled with every step. In cells nearly full of the stiff fluid,
+//! `b` keeps the shifts nearly equal: there the slip of the thin fluid has little effect, and a
+//! shift of the stiff fluid would affect all.
 
 /// Volumes and centroids of the materials of a cell.
 #[derive(Default)]

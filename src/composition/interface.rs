@@ -62,8 +62,8 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// The edges of a sheet. `second` tells whether its material is the second one; `wanted` is its
-    /// share of the cell.
+    /// The edges of a sheet. `second` tells whether its material is the second one; `wanted` is the
+    /// second material's share of the cell.
     pub fn of_sheet(strip: &Strip, second: bool, [hx, hy]: [f64; 2], wanted: f64) -> Self {
         let mut inside =
             GAUSS_6X6.each_ref().map(|g| strip.share([0.5 * g.r[0], 0.5 * g.r[1]], SHEET_RAMP));

@@ -1,9 +1,10 @@
 //! This module cuts a cell by a straight line, from the share and the centroid of one material.
 //!
-//! The line is the only one for which the material's side has the same area as its particles, and a
-//! centroid in the same direction from the centre of the cell. In coordinates `x, y >= 0` measured
-//! from the corner of the cell towards which the material lies, with `y` along the axis to which its
-//! centroid `(X, Y)` is closer, `A = 4 s <= 2` its area and `q = X/Y <= 1`, the side is
+//! The line is the only one for which the material's side has the area of its particles and a
+//! centroid in the same direction from the centre of the cell. The coordinates `x, y >= 0` are
+//! measured from the corner of the cell towards which the material lies, with `y` along the axis to
+//! which its centroid `(X, Y)` is closer. With the area `A = 4 s <= 2` and `q = X/Y <= 1`, the side
+//! is
 //!
 //! ```text
 //! q <= 1/(3 - A):  0 <= x <= 2,  0 <= y <= A/2 + m (1 - x),
@@ -11,7 +12,8 @@
 //! otherwise:       a triangle with the legs 2A/v along x and v along y,
 //!                  v = 4 A / (3 (1 - q) + sqrt(9 (1 - q)^2 + 8 A q))
 //! ```
-//! Both are exact, so that a level surface is cut level, whatever the particles' positions along it.
+//! Both are exact: the line of a horizontal surface is horizontal, whatever the positions of the
+//! particles along it.
 
 use crate::space::shape::{GAUSS_6, SUBPOINTS, lagrange_6};
 

@@ -11,7 +11,7 @@ use crate::threads;
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
-/// SHA-256 hash of the bits of all particle data, in hexadecimal.
+/// SHA-256 hash, in hexadecimal, of the bits of all particle data except the marks for drawing.
 pub fn hash(p: &Particles) -> String {
     let mut h = Sha256::new();
     let mut floats = |values: &mut dyn Iterator<Item = f64>| {

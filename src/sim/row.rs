@@ -316,12 +316,14 @@ columns! {
         symbol: "Phi", unit: "W/m", label: "dissipation", rank: Rank::Compared(5),
         path: "diagnostics/dissipation", panel: Some(Panel::Power), live: true,
     };
-    /// `|power_in - dissipation - stabilisation|` over the larger of the first two.
+    /// `|power_in - dissipation - stabilisation|` over the largest of the three, or over a rounding
+    /// scale if that is larger.
     power_error: f64 = |m| m.report.power_error(), 0.0, {
         label: "power error", format: Format::Exponent, path: "diagnostics/power_error",
         panel: Some(Panel::Balances), live: true,
     };
-    /// L2 norm of the projected divergence over the L2 norm of the strain rate.
+    /// L2 norm of the projected divergence over the L2 norm of the strain rate, with small terms
+    /// added for rest and rigid rotation.
     divergence_error: f64 = |m| m.report.divergence, 0.0, {
         label: "divergence error", format: Format::Exponent, path: "diagnostics/divergence_error",
         panel: Some(Panel::Balances),

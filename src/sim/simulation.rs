@@ -22,8 +22,8 @@ use crate::space::population::{Count, Population};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A run at its current time, in the plan's units. `D` is the number of velocity unknowns per node:
-/// 2, or 3 with Cosserat rotation; [`start`](super::start) chooses it.
+/// A run at its current time, in the plan's units. `D` is the number of unknowns per node, 2
+/// velocities or 3 with Cosserat rotation; [`start`](super::start) chooses it.
 pub struct Simulation<const D: usize> {
     pub(super) plan: Arc<Plan>,
     pub(super) stokes: Stokes<D>,

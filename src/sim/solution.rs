@@ -55,7 +55,7 @@ impl<const D: usize> Simulation<D> {
 
     fn update_restoring(&mut self, restoring: Option<(f64, &Flow<D>)>) {
         let Some((ahead, before)) = restoring else { return self.terms.restoring.clear() };
-        // First-order time stepping does not use the previous velocity.
+        // In first-order time stepping the restoring terms act on the velocity, not on its change.
         let still = self.plan.method.integrator == Integrator::Euler;
         let before = before.velocity.iter().map(|u| if still { [0.0; 2] } else { [u[0], u[1]] });
         let viscosities = self.matter.materials.iter().map(|m| m.viscosity);

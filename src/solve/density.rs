@@ -16,10 +16,10 @@
 //!
 //! `s_m` and `(X_m, Y_m)` are those of [`centroids`](crate::composition::centroids).
 //!
-//! Where a straight line separates the materials of a cell (see [`straight`]
-//! (crate::composition::straight)), either side has its own density: the weight of a fluid then acts
-//! where its stiffness is. Spread linearly over the whole cell, the weight of the heavy fluid acts
-//! on the thin one too and drives it.
+//! Where a straight line separates the materials of a cell (see
+//! [`straight`](crate::composition::straight)), each side has its own density, so that the weight
+//! of a fluid acts where its stiffness is. Distributed linearly over the whole cell, the weight of
+//! the heavy fluid would also drive the thin one.
 //!
 //! `rho_m` is a quadratic fit if particles carry their density. Particles of neighbouring cells
 //! contribute to the fit with a small weight.

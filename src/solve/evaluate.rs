@@ -286,8 +286,8 @@ impl Evaluation<'_> {
         CutStiffness { matrix, rest: 1.0 - interface.trust, sides: None }
     }
 
-    /// Stiffness of a cell of two materials on either side of a line. Each has its law at the centre
-    /// of the cell.
+    /// Stiffness of a cell of two materials on the two sides of a line. Each material has its law
+    /// at the centre of the cell.
     fn sides(
         &self,
         cell: usize,

@@ -25,7 +25,7 @@ pub struct CutStiffness {
     pub matrix: VelocityMatrix,
     /// Fraction of the viscosity that remains at the integration points.
     pub rest: f64,
-    /// The line on either side of which each material has its own stiffness and weight; `None` if the cell is
-    /// a laminate.
+    /// Line with a separate stiffness and weight of the material on each side; `None` if the cell
+    /// is a laminate.
     pub sides: Option<Sides>,
 }

@@ -12,10 +12,11 @@
 //! than a cell is a laminate with straight edges; the cells of a drop are a dilute suspension.
 //! Rotation, density and images are those of the mixture.
 //!
-//! **Sides**. As the laminate, but cells whose materials differ in density are treated differently:
-//! where a straight line separates two materials, each side has its own law and its own weight
-//! ([`sides`](super::sides)), elsewhere the mean laws are arithmetic. A series arrangement takes the
-//! stiffness from a cell that is mostly heavy, and its weight slides on the thin material.
+//! **Sides**. As the laminate, but cells whose materials differ in density are treated differently.
+//! Where a straight line separates two materials, each side has its own law and its own weight
+//! ([`sides`](super::sides)); elsewhere the mean laws are arithmetic. In series, the thin material
+//! would make a cell that is mostly heavy as soft as itself, and the weight of that cell would make
+//! it slide.
 //!
 //! **Particles**. Each particle is an integration point with its own law and a weight proportional
 //! to its volume: the method of the source paper, for comparison.
@@ -45,7 +46,8 @@ pub struct Quadrature {
     pub(super) start: Vec<u32>,
     /// Stiffness of cut cells under the laminate rule.
     cut: Vec<Option<Box<CutStiffness>>>,
-    /// Mean viscosity of the points of each cell; it scales the penalty.
+    /// Mean viscosity of each cell; where a laminate is used, the mean by volume. It scales the
+    /// penalty.
     pub mean_viscosity: Vec<f64>,
     /// Mean inverse bulk viscosity 1/B of each cell.
     pub compliance: Vec<f64>,

@@ -42,7 +42,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// Imbalance of the powers relative to the largest of them.
+    /// Imbalance of the powers relative to the largest of them, or to a millionth of the power
+    /// scale if that is larger.
     pub fn power_error(&self) -> f64 {
         let larger = [self.power_in, self.dissipation, self.restoring, REST * self.power_scale];
         let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));

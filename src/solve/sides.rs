@@ -17,10 +17,11 @@
 //! ```
 //! is zero at all nodes. Its amplitude is a linear form of the nodal velocities, the one of least
 //! power (without the response of the softer fluid alone, so that equal laws have no kink). Matrix
-//! and load are those of the velocity with the kink, and there is no further unknown. Particles move
-//! with the velocity without the kink. Where the contrast is large this makes the heavy fluid fall
-//! too fast, so the amplitude decreases to zero from a contrast of 100 to one of 1000; a thin fluid
-//! beside a stiff one is then as stiff as the stiff one, an error of the thin fluid alone.
+//! and load are those of the velocity with the kink, and there is no further unknown. Particles
+//! move with the velocity without the kink. Where the contrast is large this makes the heavy fluid
+//! fall too fast, so the amplitude decreases to zero from a contrast of 100 to one of 1000. A thin
+//! fluid beside a stiff one is then as stiff as the stiff one; this error concerns the thin fluid
+//! alone.
 //!
 //! A [laminate](super::laminate) is in series in shear. Under weight this is wrong: the stress is
 //! that of the thin fluid in the whole cell, and the weight of the stiff fluid drives it with

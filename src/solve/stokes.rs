@@ -10,9 +10,10 @@
 //! ```text
 //! ru = f - K u + B' p,   rp = B u + C p,   du = A^-1 (ru - B' W rp),   dp = -W (rp + B du)
 //! ```
-//! With `r = 1e6` and `eta` the mean viscosity of the points of the cell, two or three corrections
-//! suffice at the contrasts of the presets. A constant `r eta`, or a geometric mean for `eta`,
-//! fails at contrasts up to 1e6.
+//! With `r = 1e6` and `eta` the mean viscosity of the cell (by volume where an interface cuts it,
+//! and with the viscosity of a stiff rotation added), two or three corrections suffice at the
+//! contrasts of the presets. A constant `r eta`, or a geometric mean for `eta`, fails at a contrast
+//! of 1e6.
 //!
 //! Once the forces balance (`ru = 0`), every correction keeps them balanced, and so does every
 //! linear combination of corrections. Each new correction is therefore combined with the previous

@@ -51,8 +51,8 @@ dispatch! {
 }
 dispatch! {
     /// Eliminates the first `columns` columns, at most [`PANEL`], of a matrix of `rows` rows.
-    /// Afterwards they are columns of its Cholesky factor, with the inverse of each pivot in its
-    /// place. The error is the index of a pivot that is not positive and finite.
+    /// Afterwards they are columns of its Cholesky factor, with the reciprocal of each diagonal
+    /// entry in its place. The error is the index of a pivot that is not positive and finite.
     pub fn factor_panel(c: ColumnsMut, rows: usize, columns: usize) -> Result<(), usize>
         = factor_panel_kernel
 }

@@ -16,16 +16,16 @@
 //! `x' = -lambda x` then decays at any step for `theta > 1/2`: for `lambda dt -> infinity` its
 //! factor per step solves `theta r^2 + (3/2 - 2 theta) r + theta - 1/2 = 0` (`|r| = 0.58` for 3/4).
 //! Without the term, extrapolation is stable up to `lambda dt = 1`. The error of a step,
-//! `(5/12 - theta) dt^3 x'''`, is no larger than before.
+//! `(5/12 - theta) dt^3 x'''`, is no larger than without it.
 //!
 //! The gradient of the density is that of its cell means: jumps across faces. An interface at the
 //! fraction `s` of the height of a cell contributes the parts `1 - s` and `s` of its jump to the
-//! faces below and above, so the jump and its position are exact. All nodes of a face are shared by
-//! cells, so the matrices of uniform cells do not change.
+//! faces below and above, so the jump and its position are exact. All nodes of a face are skeleton
+//! nodes, so its term is added after the centre of its cell is condensed.
 //!
-//! An interface inside a cell also moves with the velocity at the centre of the cell, which acts on
-//! no face and which only the weaker fluid resists. The gradient of the density inside a cut cell,
-//! as its weight uses it, therefore adds such a term over the cell. There it acts on both
+//! An interface inside a cell also moves with the velocity at the centre of the cell, on which no
+//! face term acts and which only the weaker fluid resists. The gradient of the density inside a cut
+//! cell, as its weight uses it, therefore adds such a term over the cell. There it acts on both
 //! components, because the weight of a cut cell also changes as the weaker fluid slides along the
 //! interface, at right angles to gravity. Without this term, steps beyond about 200 times
 //! `eta_weak/(rho g h)` amplify rounding to speeds of the order `rho g h^2/eta_weak`: for heavy
