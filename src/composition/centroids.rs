@@ -15,6 +15,9 @@
 //! `b` keeps the shifts nearly equal: there the slip of the thin fluid has little effect, and a
 //! shift of the stiff fluid would affect all.
 
+use crate::space::mesh::Mesh;
+use crate::space::particles::Particles;
+
 /// Volumes and centroids of the materials of a cell.
 #[derive(Default)]
 pub struct Centroids {
@@ -41,22 +44,21 @@ impl Centroids {
         self.parts.resize(materials, Part::default());
     }
 
-    /// Removes all particles.
-    pub fn clear(&mut self) {
+    /// Sums the volumes and moments of the particles of a cell.
+    pub fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles) {
         self.parts.fill(Part::default());
-    }
-
-    /// Adds a particle of material `m` at the reference coordinates `r`.
-    pub fn add(&mut self, m: usize, volume: f64, r: [f64; 2]) {
-        let part = &mut self.parts[m];
-        part.volume += volume;
-        for c in 0..2 {
-            part.moment[c] += volume * r[c];
+        for p in particles.of_cell(cell) {
+            let (volume, part) =
+                (particles.volume[p], &mut self.parts[particles.material[p] as usize]);
+            let r = mesh.to_reference(cell, particles.position[p]);
+            part.volume += volume;
+            for c in 0..2 {
+                part.moment[c] += volume * r[c];
+            }
         }
     }
 
-    /// Computes the shares and the shifted centroids, after all particles are added. The volume of
-    /// each material is multiplied by its factor; `viscosity` yields that of each material of the
+    /// Computes the shares and the shifted centroids of the gathered particles. The volume of each material is multiplied by its factor; `viscosity` yields that of each material of the
     /// scene.
     pub fn finish(&mut self, factors: &[f64], viscosity: impl Iterator<Item = f64> + Clone) {
         let total: f64 = self.parts.iter().zip(factors).map(|(p, f)| p.volume * f).sum();

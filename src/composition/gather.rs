@@ -89,7 +89,6 @@ impl Gathered {
         self.volume.resize(materials, 0.0);
         self.log_viscosity.resize(materials, Fit::default());
         self.cell_orientation.resize(materials, Orientation::default());
-        self.centroids.prepare(materials);
     }
 
     /// Computes the sums over the particles of a cell.
@@ -99,7 +98,6 @@ impl Gathered {
         self.volume.fill(0.0);
         self.log_viscosity.iter_mut().for_each(Fit::clear);
         self.cell_orientation.fill(Orientation::default());
-        self.centroids.clear();
         for p in particles.of_cell(cell) {
             let m = particles.material[p] as usize;
             let volume = particles.volume[p];
@@ -112,7 +110,6 @@ impl Gathered {
             let kx = GAUSS_3.map(|g| kernel(r[0], g));
             let ky = GAUSS_3.map(|g| kernel(r[1], g));
             self.volume[m] += volume;
-            self.centroids.add(m, volume, r);
             if let Some(n) = director {
                 self.cell_orientation[m].add(volume, n);
             }
@@ -191,13 +188,17 @@ impl Gathered {
         }
     }
 
-    /// Shares and shifted centroids of the materials, for the factors and viscosities of all
-    /// materials. To be called once for a gathered cell.
+    /// Shares and shifted centroids of the materials of a cell, for the factors and viscosities of
+    /// all materials.
     pub fn centroids(
         &mut self,
+        (mesh, cell): (&Mesh, usize),
+        particles: &Particles,
         factors: &[f64],
         viscosity: impl Iterator<Item = f64> + Clone,
     ) -> &Centroids {
+        self.centroids.prepare(factors.len());
+        self.centroids.gather(mesh, cell, particles);
         self.centroids.finish(factors, viscosity);
         &self.centroids
     }

@@ -191,7 +191,7 @@ impl Surroundings {
 }
 
 /// One below `a`, zero above `b`, linear in between.
-fn fade(x: f64, [a, b]: [f64; 2]) -> f64 {
+pub(super) fn fade(x: f64, [a, b]: [f64; 2]) -> f64 {
     ((b - x) / (b - a)).clamp(0.0, 1.0)
 }
 

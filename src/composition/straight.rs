@@ -15,6 +15,7 @@
 //! Both are exact: the line of a horizontal surface is horizontal, whatever the positions of the
 //! particles along it.
 
+use super::interface::fade;
 use crate::space::shape::{GAUSS_6, SUBPOINTS, lagrange_6};
 
 /// Ratio of the distance of the material's centroid from the centre of the cell to that of its side
@@ -58,8 +59,7 @@ impl StraightCut {
             return None;
         }
         let side = Side::new(4.0 * share, x / y);
-        let trust = ((found / side.distance() - ONE_SIDED[0]) / (ONE_SIDED[1] - ONE_SIDED[0]))
-            .clamp(0.0, 1.0);
+        let trust = 1.0 - fade(found / side.distance(), ONE_SIDED);
         if trust == 0.0 {
             return None;
         }

@@ -161,14 +161,14 @@ impl Density {
 
     /// Sums the volumes and moments of the materials, and collects the points of the fits.
     fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, materials: &[Material]) {
-        self.centroids.clear();
+        self.centroids.gather(mesh, cell, particles);
         self.fits.iter_mut().for_each(Fit::clear);
+        let Some(density) = &particles.density else { return };
         for p in particles.of_cell(cell) {
             let m = particles.material[p] as usize;
-            let r = mesh.to_reference(cell, particles.position[p]);
-            self.centroids.add(m, particles.volume[p], r);
-            if let (Some(d), true) = (&particles.density, materials[m].carries_density) {
-                self.fits[m].add(particles.volume[p], r, d[p]);
+            if materials[m].carries_density {
+                let r = mesh.to_reference(cell, particles.position[p]);
+                self.fits[m].add(particles.volume[p], r, density[p]);
             }
         }
     }

@@ -205,14 +205,14 @@ impl Evaluation<'_> {
     fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
         if self.rule == Rule::Sides && self.densities_differ(scratch.volumes()) {
             let between = present(scratch.volumes());
-            let cut = between.and_then(|b| Some((self.straight_cut(b, scratch)?, b)));
+            let cut = between.and_then(|b| Some((self.straight_cut(cell, b, scratch)?, b)));
             return match cut {
                 Some((cut, between)) => Form::Sides { cut, between },
                 None => Form::Weights,
             };
         }
         let viscosity: [f64; 2] = match present(scratch.volumes()) {
-            Some(between) => between.map(|m| self.viscosity_in_cell(cell, m, scratch)),
+            Some(between) => between.map(|m| self.law_at_centre(cell, m, scratch).shear.mean()),
             None => return Form::Mixture,
         };
         let Some(mut around) = scratch.neighbourhood(self.mesh, cell, self.particles) else {
@@ -244,9 +244,15 @@ impl Evaluation<'_> {
     }
 
     /// The straight line between the two materials of a gathered cell.
-    fn straight_cut(&self, [_, b]: [usize; 2], scratch: &mut Gathered) -> Option<StraightCut> {
+    fn straight_cut(
+        &self,
+        cell: usize,
+        [_, b]: [usize; 2],
+        scratch: &mut Gathered,
+    ) -> Option<StraightCut> {
         let viscosity = self.materials.iter().map(|m| m.viscosity);
-        let centroids = scratch.centroids(self.factors, viscosity);
+        let centroids =
+            scratch.centroids((self.mesh, cell), self.particles, self.factors, viscosity);
         StraightCut::new(centroids.share(b), centroids.centroid(b))
     }
 
@@ -295,19 +301,16 @@ impl Evaluation<'_> {
         between: [usize; 2],
         scratch: &Gathered,
     ) -> CutStiffness {
-        let laws = between.map(|m| {
-            let eta = self.viscosity(m, [0.0; 2], scratch);
-            self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m))
-        });
+        let laws = between.map(|m| self.law_at_centre(cell, m, scratch));
         let (mut matrix, kink) = sides::matrix(&cut, &laws, self.mesh.cell_measure(cell));
         matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);
         CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kink }) }
     }
 
-    /// Mean viscosity of the law of one material at the centre of the cell.
-    fn viscosity_in_cell(&self, cell: usize, m: usize, scratch: &Gathered) -> f64 {
+    /// Law of one material at the centre of the cell.
+    fn law_at_centre(&self, cell: usize, m: usize, scratch: &Gathered) -> PointLaw {
         let eta = self.viscosity(m, [0.0; 2], scratch);
-        self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m)).shear.mean()
+        self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m))
     }
 
     /// Mean of the viscosities of the cell's materials, weighted by volume.

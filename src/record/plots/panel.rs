@@ -190,6 +190,13 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         self.plot.curves.iter().zip(self.bars).map(ends).collect()
     }
 
+    /// Pixel at the fractions `u` and `v` of the frame, from its lower left corner.
+    fn pixel(&self, u: f64, v: f64) -> (i32, i32) {
+        let [left, top, right, bottom] = self.frame;
+        let (width, height) = (f64::from(right - left), f64::from(bottom - top));
+        (left + (u * width).round() as i32, bottom - (v * height).round() as i32)
+    }
+
     pub(super) fn bars_of(
         &self,
         ends: &[(f64, f64)],
@@ -197,15 +204,13 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         x: &Scale,
         y: &Scale,
     ) -> Drawn<B> {
-        let [left, top, right, bottom] = self.frame;
-        let (width, height) = (f64::from(right - left), f64::from(bottom - top));
         let style = self.line(RGBColor(r, g, b), 2.0);
         let half = self.px(6.0);
         for pair in ends.chunks_exact(2) {
             let place = |(px, py): (f64, f64)| {
                 // A lower end that is not positive is drawn at the frame on a logarithmic axis.
                 let (u, v) = (x.place(px)?, y.place(py).unwrap_or(0.0));
-                Some((left + (u * width).round() as i32, bottom - (v * height).round() as i32))
+                Some(self.pixel(u, v))
             };
             let (Some(low), Some(high)) = (place(pair[0]), place(pair[1])) else { continue };
             self.area.draw(&PathElement::new([low, high], style))?;
@@ -223,11 +228,9 @@ impl<'a, B: DrawingBackend> Panel<'a, B> {
         x: &Scale,
         y: &Scale,
     ) -> Drawn<B> {
-        let [left, top, right, bottom] = self.frame;
-        let (width, height) = (f64::from(right - left), f64::from(bottom - top));
         let place = |&(px, py): &(f64, f64)| {
             let (u, v) = (x.place(px)?, y.place(py)?);
-            Some((left + (u * width).round() as i32, bottom - (v * height).round() as i32))
+            Some(self.pixel(u, v))
         };
         let color = RGBColor(r, g, b);
         let places: Vec<Option<(i32, i32)>> = curve.points.iter().map(place).collect();
