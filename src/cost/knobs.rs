@@ -182,6 +182,7 @@ fn quadrature(scene: &Scene, plan: &Plan) -> Option<Knob> {
         (Quadrature::Particles, "particles"),
         (Quadrature::Mixture, "mixture"),
         (Quadrature::Laminate, "laminate"),
+        (Quadrature::Sides, "sides"),
     ];
     choice("quadrature", "accuracy.quadrature", scene.accuracy.quadrature, &words)
 }

@@ -60,7 +60,8 @@ impl Mixture {
         if self.parallel {
             self.shear.add_scaled(phi, &law.shear);
             self.dilation_share += phi * law.dilation;
-            self.coupling += phi * law.coupling;
+            self.coupling += phi * law.coupling / law.shear.mean();
+            self.inverse_dilation += phi / law.shear.mean();
             return;
         }
         let shear = shifted(&law.shear, self.around);
@@ -76,7 +77,8 @@ impl Mixture {
     pub fn law(&self) -> PointLaw {
         if self.parallel {
             let (shear, dilation) = (self.shear, self.dilation_share);
-            return PointLaw { shear, dilation, coupling: self.coupling, couple: self.couple };
+            let coupling = self.coupling / self.inverse_dilation;
+            return PointLaw { shear, dilation, coupling, couple: self.couple };
         }
         let shear = shifted(&self.shear.inverse(), -self.around);
         PointLaw {

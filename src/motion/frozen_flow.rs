@@ -4,7 +4,9 @@
 use super::cell_velocity::{CellVelocity, Points, TOGETHER, trace_points};
 use crate::laws::director;
 use crate::simd::Simd;
+use crate::space::kink::Kink;
 use crate::space::mesh::{Axis, INSIDE, Mesh, Span};
+use crate::space::shape::NODES;
 use crate::space::walls::{Enclosure, Landing};
 use crate::threads;
 use nalgebra::Matrix2;
@@ -15,18 +17,32 @@ pub const CELL_GRAIN: usize = 64;
 /// Corrected velocity of every cell. The buffer is reused in the next step.
 pub struct CellVelocities {
     cells: Vec<CellVelocity>,
+    /// Part of the velocity of each cell that has a kink; empty if no velocity of the run has one.
+    edges: Vec<Option<Edge>>,
     /// Whether no wall, side of the domain or periodic seam lies between the points of the 3 x 3
     /// cells around the cell.
     free: Vec<bool>,
 }
 
 impl CellVelocities {
-    /// Zero velocities on a mesh.
-    pub fn new(mesh: &Mesh, enclosure: &Enclosure) -> Self {
+    /// Zero velocities on a mesh. `kinked`: whether velocities may have kinks.
+    pub fn new(mesh: &Mesh, enclosure: &Enclosure, kinked: bool) -> Self {
         let free = (0..mesh.cells()).map(|cell| is_free(mesh, enclosure, cell)).collect();
-        CellVelocities { cells: vec![CellVelocity::default(); mesh.cells()], free }
+        let edges = if kinked { vec![None; mesh.cells()] } else { Vec::new() };
+        CellVelocities { cells: vec![CellVelocity::default(); mesh.cells()], edges, free }
     }
 }
+
+/// Part `b |d| j` of the velocity of a cell, see [`Kink`].
+#[derive(Clone, Copy)]
+struct Edge {
+    kink: Kink,
+    /// The factor `j`, along the line.
+    jump: [f64; 2],
+}
+
+/// Kinks of the velocity, and their amplitudes for the nodal velocities of a cell.
+pub type Kinks<'a> = dyn Fn(usize, &[[f64; 2]; NODES]) -> Option<(Kink, f64)> + Sync + 'a;
 
 /// Whether a cell and its neighbours contain no wall, solid, side or seam.
 fn is_free(mesh: &Mesh, enclosure: &Enclosure, cell: usize) -> bool {
@@ -54,6 +70,7 @@ pub struct FrozenFlow<'a> {
     pub dt: f64,
     /// Velocity of every cell at the middle of the step.
     velocities: &'a [CellVelocity],
+    edges: &'a [Option<Edge>],
     free: &'a [bool],
     simd: Simd,
 }
@@ -116,20 +133,46 @@ impl StartCell {
 }
 
 impl<'a> FrozenFlow<'a> {
-    /// The frozen field of a step of length `dt`. `velocity`: nodal velocities at its middle.
+    /// The frozen field of a step of length `dt`. `velocity`: nodal velocities at its middle;
+    /// `kinks`: their kinks, which only velocities created with kinks have.
     pub fn new(
         mesh: &'a Mesh,
         enclosure: &'a Enclosure,
         velocities: &'a mut CellVelocities,
         velocity: &[[f64; 2]],
+        kinks: &Kinks,
         dt: f64,
     ) -> Self {
-        threads::for_each(&mut velocities.cells, CELL_GRAIN, |cell, current| {
-            let nodal = mesh.cell_nodes(cell).map(|n| velocity[n]);
+        let CellVelocities { cells, edges, free } = velocities;
+        let of_nodes = |cell| mesh.cell_nodes(cell).map(|n| velocity[n]);
+        threads::for_each(edges, CELL_GRAIN, |cell, edge| {
+            *edge = kinks(cell, &of_nodes(cell))
+                .map(|(kink, amplitude)| Edge { kink, jump: kink.along.map(|t| t * amplitude) });
+        });
+        threads::for_each(cells, CELL_GRAIN, |cell, current| {
+            let mut nodal = of_nodes(cell);
+            if let Some(Some(Edge { kink, jump })) = edges.get(cell) {
+                for (u, psi) in nodal.iter_mut().zip(kink.biquadratic()) {
+                    *u = [u[0] + psi * jump[0], u[1] + psi * jump[1]];
+                }
+            }
             *current = CellVelocity::new(&nodal, mesh.cell_size(cell));
         });
-        let CellVelocities { cells, free } = velocities;
-        FrozenFlow { mesh, enclosure, dt, velocities: cells, free, simd: Simd::used() }
+        let simd = Simd::used();
+        FrozenFlow { mesh, enclosure, dt, velocities: cells, edges, free, simd }
+    }
+
+    /// Part of the velocity of a cell that has a kink, if there is one.
+    fn edge(&self, cell: usize) -> Option<&Edge> {
+        self.edges.get(cell)?.as_ref()
+    }
+
+    /// Velocity at a cell and reference coordinates.
+    fn velocity(&self, cell: usize, r: [f64; 2]) -> [f64; 2] {
+        let u = self.velocities[cell].at(r);
+        let Some(Edge { kink, jump }) = self.edge(cell) else { return u };
+        let psi = kink.edge(r);
+        [u[0] + psi * jump[0], u[1] + psi * jump[1]]
     }
 
     /// The start cell with an index.
@@ -168,7 +211,7 @@ impl<'a> FrozenFlow<'a> {
             let cell = mesh.locate(place);
             (cell, mesh.to_reference(cell, place))
         });
-        (self.velocities[cell].at(r), (cell, r))
+        (self.velocity(cell, r), (cell, r))
     }
 
     /// Advects a point from `p` with the classical fourth-order Runge-Kutta method. The field is
@@ -177,7 +220,7 @@ impl<'a> FrozenFlow<'a> {
     /// `(dt |grad u|)^4 / 4` per step, this method by `(dt |grad u|)^6 / 72`.
     pub fn travel(&self, home: &StartCell, p: [f64; 2]) -> Displacement {
         let dt = self.dt;
-        let k1 = self.velocities[home.cell].at(home.reference(p));
+        let k1 = self.velocity(home.cell, home.reference(p));
         let (k2, _) = self.stage(home, p, k1, 0.5 * dt);
         let (k3, middle) = self.stage(home, p, k2, 0.5 * dt);
         let (k4, _) = self.stage(home, p, k3, dt);
@@ -206,6 +249,10 @@ impl<'a> FrozenFlow<'a> {
             return;
         }
         let (home, dt) = (self.home(cell), self.dt);
+        if self.edge(cell).is_some() {
+            from.iter().enumerate().for_each(|(k, &p)| arrive(k, self.travel(&home, p)));
+            return;
+        }
         for (at, points) in from.chunks(TOGETHER).enumerate() {
             let mut r: Points = [[0.0; TOGETHER]; 2];
             for (k, p) in points.iter().enumerate() {
@@ -228,7 +275,17 @@ impl<'a> FrozenFlow<'a> {
 
     /// Velocity gradient at a cell and reference coordinates, such as the middle of a displacement.
     pub fn gradient(&self, (cell, r): (usize, [f64; 2])) -> Matrix2<f64> {
-        self.velocities[cell].gradient(r, self.mesh.cell_size(cell))
+        let size = self.mesh.cell_size(cell);
+        let mut gradient = self.velocities[cell].gradient(r, size);
+        if let Some(Edge { kink, jump }) = self.edge(cell) {
+            let slopes = kink.slopes_of_edge(r);
+            for i in 0..2 {
+                for j in 0..2 {
+                    gradient[(i, j)] += jump[i] * slopes[j] * 2.0 / size[j];
+                }
+            }
+        }
+        gradient
     }
 
     /// The director `n` after the step under the velocity gradient `l`.

@@ -57,11 +57,11 @@ fn lines(p: &Plan) -> (Vec<Gauge>, Option<Tracers>, Vec<[f64; 5]>) {
     (gauges.collect(), dye, marks)
 }
 
-/// Frame times and end time (s), largest step (s), and the Courant and strain limits.
-fn times(p: &Plan) -> (Vec<f64>, Option<f64>, [f64; 2]) {
+/// Frame times and end time (s), largest step (s), and the other limits of the step.
+fn times(p: &Plan) -> (Vec<f64>, Option<f64>, [f64; 3]) {
     let t = p.units.time;
     let frames = p.clock.frames.iter().chain([&p.clock.end]).map(|v| v * t);
-    (frames.collect(), p.clock.max_step.map(|v| v * t), [p.clock.courant, p.clock.strain])
+    (frames.collect(), p.clock.max_step.map(|v| v * t), p.clock.limits())
 }
 
 /// Mesh lines and walls in SI units; a scheduled change must not alter them.

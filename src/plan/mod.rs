@@ -258,8 +258,10 @@ pub struct ClockPlan {
     pub end: f64,
     /// Largest time step.
     pub max_step: Option<f64>,
-    /// Largest number of cells that a particle crosses in a step (Courant number).
+    /// Largest number of cells that the materials of interest cross in a step (Courant number).
     pub courant: f64,
+    /// Largest error of the displacements of the materials of interest in a step, in cells.
+    pub tolerance: f64,
     /// Largest strain of layered material in a step.
     pub strain: f64,
     /// Times that a step ends at exactly: frames, changes and the end, in ascending order.
@@ -281,6 +283,13 @@ pub struct FrameContent {
     pub glyphs: u32,
     /// Colours (sRGB) of the materials, followed by the colour of marked particles.
     pub colours: Vec<[u8; 3]>,
+}
+
+impl ClockPlan {
+    /// Limits of the step that are numbers: tolerance, Courant number and strain.
+    pub fn limits(&self) -> [f64; 3] {
+        [self.tolerance, self.courant, self.strain]
+    }
 }
 
 impl Plan {

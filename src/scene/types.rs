@@ -542,8 +542,13 @@ pub struct Time {
     /// Largest time step, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_step: Option<Quantity>,
-    /// Largest number of cells that a particle crosses in a step (Courant number); cells made
-    /// smaller by grading count less.
+    /// Largest error of the displacements of the materials of interest (all but the background) in
+    /// a step, in cells. It determines the step unless `courant`, `strain` or `max_step` demand a
+    /// shorter one.
+    #[serde(default = "step_tolerance_default")]
+    pub tolerance: f64,
+    /// Largest number of cells that the materials of interest cross in a step (Courant number);
+    /// cells made smaller by grading count less.
     #[serde(default = "courant_default")]
     pub courant: f64,
     /// Largest strain of layered material in a step.
@@ -599,9 +604,9 @@ pub enum Quadrature {
     /// Like `mixture`, but in cells that contain an interface of two materials, shear along the
     /// interface is in series and stretch along it in parallel.
     Laminate,
-    /// Like `laminate`, but where materials of different weight share a cell, each has its own
-    /// stiffness and weight on its side of a straight line. For free surfaces of heavy material under
-    /// a fluid more than a thousand times thinner.
+    /// Where materials of different weight share a cell, each has its own stiffness and weight on
+    /// its side of a straight line, along which the velocity may have a kink. Elsewhere like
+    /// `laminate`.
     Sides,
     /// Particles as the only integration points: the method of the source.
     Particles,
@@ -699,7 +704,7 @@ impl Default for Accuracy {
             cells: 32,
             particles_per_cell: 16,
             placement: Placement::Regular,
-            quadrature: Quadrature::Laminate,
+            quadrature: Quadrature::Sides,
             integrator: Integrator::Extrapolated,
             stabilisation: 0.75,
             tolerance: 1e-12,
@@ -736,8 +741,11 @@ fn zero_field() -> Field {
 fn growth_default() -> f64 {
     1.5
 }
+fn step_tolerance_default() -> f64 {
+    0.1
+}
 fn courant_default() -> f64 {
-    0.5
+    2.0
 }
 fn strain_default() -> f64 {
     0.25

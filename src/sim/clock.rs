@@ -18,17 +18,19 @@ pub enum Limiter {
     MaxStep,
     /// A multiple of the relaxation time of the stratification.
     Relaxation,
-    /// A step may exceed the previous one by at most half.
+    /// A step may be at most twice as long as the previous one.
     Growth,
     /// The time of a frame, of a scheduled change or of the end.
     Stop,
     /// The step was shortened because a longer one failed.
     Guard,
+    /// `time.tolerance`: error of the displacements of the materials of interest.
+    Tolerance,
 }
 
 impl Limiter {
     /// All limiters. Saved states contain their index here, so new ones must be appended.
-    pub const ALL: [Limiter; 8] = [
+    pub const ALL: [Limiter; 9] = [
         Limiter::Start,
         Limiter::Courant,
         Limiter::Strain,
@@ -37,6 +39,7 @@ impl Limiter {
         Limiter::Growth,
         Limiter::Stop,
         Limiter::Guard,
+        Limiter::Tolerance,
     ];
 
     /// Name in `series.csv`.
@@ -50,6 +53,7 @@ impl Limiter {
             Limiter::Growth => "growth",
             Limiter::Stop => "stop",
             Limiter::Guard => "guard",
+            Limiter::Tolerance => "tolerance",
         }
     }
 }
@@ -57,16 +61,22 @@ impl Limiter {
 /// Quantities of the flow and the materials that limit the step, in the plan's units.
 #[derive(Clone, Copy, Debug)]
 pub struct Speeds {
-    /// Largest number of cells crossed per unit time.
+    /// Largest number of cells that the materials of interest cross per unit time.
     pub crossings: f64,
+    /// Step at which the displacement error reaches its tolerance; `None` if it is not known.
+    pub tolerated: Option<f64>,
     /// Largest strain rate of layered material.
     pub strain_rate: f64,
     /// Largest step for a stable stratification; `None` if there is none.
     pub relaxation: Option<f64>,
 }
 
-/// Largest ratio of consecutive steps; the extrapolation of the velocity needs similar steps.
-const GROWTH: f64 = 1.5;
+/// Largest ratio of consecutive steps; the extrapolation of the velocity needs similar steps. After
+/// two halves of an interval between frames, the next interval can be one step.
+const GROWTH: f64 = 2.0;
+
+/// Largest number of cells crossed in the first step.
+const FIRST_COURANT: f64 = 0.5;
 
 /// Length and limiter of the step that starts at `time`; `previous`: length of the previous step.
 pub fn next_step(
@@ -83,8 +93,16 @@ pub fn next_step(
             best = (dt, name);
         }
     };
-    limit(clock.courant / speeds.crossings, Limiter::Courant);
+    // The error of the first step is not known in advance.
+    let courant = match speeds.tolerated {
+        Some(_) => clock.courant,
+        None => clock.courant.min(FIRST_COURANT),
+    };
+    limit(courant / speeds.crossings, Limiter::Courant);
     limit(clock.strain / speeds.strain_rate, Limiter::Strain);
+    if let Some(dt) = speeds.tolerated {
+        limit(dt, Limiter::Tolerance);
+    }
     if let Some(dt) = clock.max_step {
         limit(dt, Limiter::MaxStep);
     }
@@ -95,7 +113,7 @@ pub fn next_step(
         limit(GROWTH * dt, Limiter::Growth);
     }
     let (dt, name) = best;
-    if dt >= remaining {
+    if dt >= remaining * (1.0 - 1e-9) {
         (remaining, Limiter::Stop)
     } else if dt > 0.5 * remaining {
         // Two equal steps instead of a full and a very short one.

@@ -104,7 +104,7 @@ fn places(plan: &Plan) -> Particles {
         positions.into_iter().for_each(|p| out.push(p, volume, 0));
     }
     out.sort(mesh);
-    Population::new(mesh, &plan.enclosure, plan.method.seeding).control(
+    Population::new(mesh, &plan.enclosure, plan.method.seeding, plan.background()).control(
         mesh,
         &mut out,
         &mut Count::default(),

@@ -36,8 +36,13 @@ impl<const D: usize> Simulation<D> {
         let materials = &self.matter.materials;
         let layered = |m: usize| materials[m].law.is_layered();
         let velocity = &self.flow.velocity;
-        let crossings = self.crossings(|node| [velocity[node][0], velocity[node][1]]);
-        let mut speeds = Speeds { crossings, strain_rate: 0.0, relaxation: self.matter.relaxation };
+        let moving = |node: usize| [velocity[node][0], velocity[node][1]];
+        let mut speeds = Speeds {
+            crossings: self.crossings(moving, |node| self.interest.contains(node)),
+            tolerated: self.tolerated,
+            strain_rate: 0.0,
+            relaxation: self.matter.relaxation,
+        };
         if !self.plan.effects.directors {
             return speeds;
         }
@@ -56,13 +61,19 @@ impl<const D: usize> Simulation<D> {
         speeds
     }
 
-    /// Largest number of cells crossed per unit time with given nodal velocities.
-    pub(super) fn crossings(&self, velocity: impl Fn(usize) -> [f64; 2]) -> f64 {
+    /// Largest number of cells crossed per unit time with given nodal velocities, of the nodes that
+    /// `counts` selects.
+    pub(super) fn crossings(
+        &self,
+        velocity: impl Fn(usize) -> [f64; 2],
+        counts: impl Fn(usize) -> bool,
+    ) -> f64 {
         let crossed = |(node, rate): (usize, &[f64; 2])| {
             let u = velocity(node);
             (u[0].abs() * rate[0]).max(u[1].abs() * rate[1])
         };
-        self.crossing_rates.iter().enumerate().map(crossed).fold(0.0, f64::max)
+        let all = self.crossing_rates.iter().enumerate();
+        all.filter(|(node, _)| counts(*node)).map(crossed).fold(0.0, f64::max)
     }
 
     /// Projected area of a material over the volume of its particles.

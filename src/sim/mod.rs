@@ -18,6 +18,7 @@ mod examine;
 mod fault;
 pub mod guard;
 pub mod initial;
+mod interest;
 mod measure;
 pub mod phases;
 pub mod row;

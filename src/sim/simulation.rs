@@ -3,6 +3,7 @@
 use super::clock::{self, Limiter};
 use super::error::SimError;
 use super::initial;
+use super::interest::Interest;
 use super::phases::Phases;
 use super::row::Row;
 use crate::motion::advect::Displacements;
@@ -10,6 +11,7 @@ use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
 use crate::plan::{Matter, Plan};
+use crate::scene::Quadrature as Rule;
 use crate::solve::density::Density;
 use crate::solve::quadrature::Quadrature;
 use crate::solve::report::Report;
@@ -36,6 +38,11 @@ pub struct Simulation<const D: usize> {
     pub(super) restoring_faces: Vec<Face>,
     pub(super) particles: Particles,
     pub(super) velocities: CellVelocities,
+    /// Nodes whose motion determines the time step.
+    pub(super) interest: Interest,
+    /// Step at which the displacement error reaches its tolerance, in the plan's units; `None`
+    /// before the first step.
+    pub(super) tolerated: Option<f64>,
     /// Cells that a unit velocity at each node crosses per unit time, by direction.
     pub(super) crossing_rates: Vec<[f64; 2]>,
     pub(super) displacements: Displacements,
@@ -96,12 +103,16 @@ impl<const D: usize> Simulation<D> {
         let clock = Instant::now();
         let mesh = plan.mesh.clone();
         let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
+        let mut quadrature =
+            Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len());
+        quadrature.bind_kinks(|cell| constraints.fixed_sides(&mesh, cell));
         let stokes = Stokes::new(mesh.clone(), constraints);
-        let population = Population::new(&mesh, &plan.enclosure, plan.method.seeding);
+        let population =
+            Population::new(&mesh, &plan.enclosure, plan.method.seeding, plan.background());
         let particles = initial::particles(&plan)?;
         let fixed_load = plan.fixed_loads::<D>();
         let mut sim = Simulation {
-            quadrature: Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len()),
+            quadrature,
             terms: Terms::of(&plan),
             restoring_faces: if plan.method.stabilisation.is_some() {
                 open_faces(&mesh, &plan.enclosure)
@@ -113,7 +124,13 @@ impl<const D: usize> Simulation<D> {
                 Neighbours::new(&mesh, &plan.enclosure),
                 plan.state.materials.len(),
             ),
-            velocities: CellVelocities::new(&mesh, &plan.enclosure),
+            velocities: CellVelocities::new(
+                &mesh,
+                &plan.enclosure,
+                plan.rule_of_cells() == Rule::Sides,
+            ),
+            interest: Interest::default(),
+            tolerated: None,
             crossing_rates: clock::crossing_rates(&mesh),
             displacements: Displacements::default(),
             flow: Flow::zero(&mesh),

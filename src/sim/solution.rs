@@ -33,6 +33,8 @@ impl<const D: usize> Simulation<D> {
                 source.y *= plan.units.length;
                 SimError::Empty { step, time, source }
             })?;
+        let background = self.plan.background();
+        self.interest.update(&plan.mesh, self.quadrature.composition(), background);
         seconds.quadrature += phase.elapsed().as_secs_f64();
         let phase = Instant::now();
         self.update_load();

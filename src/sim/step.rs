@@ -8,11 +8,17 @@ use super::simulation::{Before, Simulation};
 use crate::motion::advect;
 use crate::motion::frozen_flow::FrozenFlow;
 use crate::plan::When;
+use crate::space::flow::Flow;
 use crate::space::population::Count;
 use std::time::Instant;
 
 /// A step is shortened if the half-step velocity exceeds its Courant limit by this factor.
 const SURPRISE: f64 = 4.0;
+
+/// Largest factors by which the step of a given error rises and falls from one step to the next.
+const LARGEST_RISE: f64 = 1.25;
+/// See [`LARGEST_RISE`].
+const LARGEST_FALL: f64 = 0.5;
 
 impl<const D: usize> Simulation<D> {
     /// Takes one step.
@@ -40,7 +46,8 @@ impl<const D: usize> Simulation<D> {
             extra += self.find_half_step_velocity(dt, &mut seconds)?;
             // At the start of a flow, the half-step velocity can be much larger than the current
             // one.
-            let crossed = dt * self.crossings(|node| self.half[node]);
+            let counts = |node| self.interest.contains(node);
+            let crossed = dt * self.crossings(|node| self.half[node], counts);
             let most = self.plan.clock.courant;
             if crossed <= SURPRISE * most {
                 break;
@@ -51,10 +58,13 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let plan = self.plan.clone();
         let parts = self.parts(dt);
-        let Simulation { velocities, half, matter, .. } = self;
+        let Simulation { velocities, half, matter, quadrature, .. } = self;
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = dt / f64::from(parts);
-        let frozen_flow = FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, part);
+        let frozen_flow = {
+            let kinks = quadrature.kinks();
+            FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, &kinks, part)
+        };
         for _ in 0..parts {
             advect::advance(
                 &frozen_flow,
@@ -87,6 +97,7 @@ impl<const D: usize> Simulation<D> {
             self.flow.extrapolate(&previous.flow, dt / previous.dt);
         }
         let solved = self.solve(ahead.flatten().map(|t| (t, &before)), &mut seconds);
+        self.tolerated = Some(self.tolerated_step(&before, dt));
         let older = self.previous.take();
         if changed {
             self.spare = before;
@@ -103,7 +114,7 @@ impl<const D: usize> Simulation<D> {
     /// no point crosses more than a cell; otherwise each substep crosses at most half a cell.
     /// Longer substeps would make the particle density uneven although the flow is divergence-free.
     fn parts(&self, dt: f64) -> u32 {
-        let crossed = dt * self.crossings(|node| self.half[node]);
+        let crossed = dt * self.crossings(|node| self.half[node], |_| true);
         if crossed > 1.0 { (2.0 * crossed).ceil().min(1e4) as u32 } else { 1 }
     }
 
@@ -146,10 +157,13 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let mut there = self.particles.clone();
         let parts = self.parts(0.5 * dt);
-        let Simulation { velocities, half, matter, displacements, .. } = self;
+        let Simulation { velocities, half, matter, displacements, quadrature, .. } = self;
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = 0.5 * dt / f64::from(parts);
-        let frozen_flow = FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, part);
+        let frozen_flow = {
+            let kinks = quadrature.kinks();
+            FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, &kinks, part)
+        };
         let (effects, no_gauges, mut ignored) = (&plan.effects, &mut [], Count::default());
         for _ in 0..parts {
             advect::advance(
@@ -174,6 +188,31 @@ impl<const D: usize> Simulation<D> {
         self.particles = here;
         solved?;
         Ok(self.report.corrections)
+    }
+
+    /// Length of the next step, after a step of length `dt` from the flow `before`, at which the
+    /// displacement error reaches its tolerance.
+    ///
+    /// The displacement of the step was `dt` times the velocity in `half`, which was extrapolated
+    /// from earlier flows. The flow at the end of the step gives the trapezoidal rule,
+    ///
+    /// ```text
+    /// error = max over nodes of  dt |u_half - (u_before + u_now)/2| / h  =  O(dt^k)
+    /// next  = dt (tolerance/error)^(1/k),   k = 3 (2 in first-order time stepping)
+    /// ```
+    fn tolerated_step(&self, before: &Flow<D>, dt: f64) -> f64 {
+        let error = dt
+            * self.crossings(
+                |node| {
+                    let (u, v) = (before.velocity[node], self.flow.velocity[node]);
+                    [0, 1].map(|c| self.half[node][c] - 0.5 * (u[c] + v[c]))
+                },
+                |node| self.interest.contains(node),
+            );
+        let order = if self.plan.method.integrator == Integrator::Euler { 2.0 } else { 3.0 };
+        let next = dt * (self.plan.clock.tolerance / error).powf(1.0 / order);
+        let longest = LARGEST_RISE * self.tolerated.unwrap_or(dt).max(dt);
+        next.clamp(LARGEST_FALL * dt, longest)
     }
 
     /// Applies the scheduled changes that are due, and returns whether there were any.

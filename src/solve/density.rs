@@ -215,7 +215,7 @@ impl Density {
             let share = sides.cut.share[q];
             let of = sides.between.map(|m| self.of_material(m, g.r, materials));
             let mass = [(1.0 - share) * of[0], share * of[1]];
-            let psi = sides.kink.values(g);
+            let psi = sides.kinked.as_ref().map_or([0.0; 2], |kinked| kinked.kink.values(g));
             let rest = if trust < 1.0 { (1.0 - trust) * self.linear(g.r, materials) } else { 0.0 };
             out.density[q] = trust * (mass[0] + mass[1]) + rest;
             out.kinked[q] = trust * (mass[0] * psi[0] + mass[1] * psi[1]);

@@ -16,6 +16,7 @@ use crate::laws::rates::Rates;
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
 use crate::space::flow::Flow;
+use crate::space::kink::Ramp;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_6X6, SUBPOINTS, Shape};
@@ -62,6 +63,8 @@ pub struct Evaluation<'a> {
     pub content: &'a [Content],
     /// Factor on each material's volume in cut cells.
     pub factors: &'a [f64],
+    /// Ramp of the kink that the velocity of each cell may have.
+    pub ramps: &'a [Option<Ramp>],
     /// Last iterate, for laws that depend on rates or pressure.
     pub flow: &'a dyn LastFlow,
 }
@@ -302,9 +305,13 @@ impl Evaluation<'_> {
         scratch: &Gathered,
     ) -> CutStiffness {
         let laws = between.map(|m| self.law_at_centre(cell, m, scratch));
-        let (mut matrix, kink) = sides::matrix(&cut, &laws, self.mesh.cell_measure(cell));
+        let (mut matrix, mut kinked) =
+            sides::matrix(&cut, &laws, self.mesh.cell_measure(cell), self.ramps[cell]);
         matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);
-        CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kink }) }
+        if let Some(kinked) = &mut kinked {
+            kinked.divergence = kinked.divergence.map(|d| cut.trust * d);
+        }
+        CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kinked }) }
     }
 
     /// Law of one material at the centre of the cell.

@@ -1,7 +1,7 @@
 //! This module defines integration points and the stiffness of cells cut by an interface.
 
 use super::laminate::VelocityMatrix;
-use super::sides::Sides;
+use super::sides::{Kinked, Sides};
 use crate::laws::point::PointLaw;
 
 /// One integration point of a cell.
@@ -28,4 +28,11 @@ pub struct CutStiffness {
     /// Line with a separate stiffness and weight of the material on each side; `None` if the cell
     /// is a laminate.
     pub sides: Option<Sides>,
+}
+
+impl CutStiffness {
+    /// Kink of the velocity of the cell, if it has one.
+    pub fn kinked(&self) -> Option<&Kinked> {
+        self.sides.as_ref()?.kinked.as_ref()
+    }
 }

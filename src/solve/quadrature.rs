@@ -23,13 +23,15 @@
 
 use super::evaluate::{CellsMut, Evaluation, LastFlow};
 use super::points::{CutStiffness, IntegrationPoint};
+use super::sides::Kinked;
 use crate::composition::{Composition, Content, EmptyCell, Kind, SCRATCH};
 use crate::laws::point::PointLaw;
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
+use crate::space::kink::{Kink, Ramp};
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
-use crate::space::shape::{GAUSS_3X3, Shape};
+use crate::space::shape::{GAUSS_3X3, NODES, Shape};
 use crate::threads;
 
 /// Largest number of cells per task.
@@ -44,6 +46,8 @@ pub struct Quadrature {
     pub(super) points: Vec<IntegrationPoint>,
     /// Index of the first point of each cell, and the number of points.
     pub(super) start: Vec<u32>,
+    /// Ramp of the kink that the velocity of each cell may have.
+    ramps: Vec<Option<Ramp>>,
     /// Stiffness of cut cells under the laminate rule.
     cut: Vec<Option<Box<CutStiffness>>>,
     /// Mean viscosity of each cell; where a laminate is used, the mean by volume. It scales the
@@ -74,6 +78,7 @@ impl Quadrature {
             kinds: Vec::with_capacity(materials),
             points,
             start,
+            ramps: vec![Ramp::new([false; 4]); cells],
             cut: vec![None; cells],
             mean_viscosity: vec![0.0; cells],
             compliance: vec![0.0; cells],
@@ -101,6 +106,12 @@ impl Quadrature {
             }
         }
         out
+    }
+
+    /// Declares the sides of each cell on which the velocity is prescribed, so that kinks must be
+    /// zero there.
+    pub fn bind_kinks(&mut self, fixed: impl Fn(usize) -> [bool; 4]) {
+        self.ramps.iter_mut().enumerate().for_each(|(cell, r)| *r = Ramp::new(fixed(cell)));
     }
 
     /// Materials of all cells.
@@ -132,6 +143,20 @@ impl Quadrature {
     /// viscosity.
     pub fn cut(&self, cell: usize) -> Option<&CutStiffness> {
         self.cut[cell].as_deref()
+    }
+
+    /// Kink of the velocity in a cell, if it has one.
+    pub fn kinked(&self, cell: usize) -> Option<&Kinked> {
+        self.cut(cell)?.kinked()
+    }
+
+    /// The kinks of cells, with their amplitudes for the nodal velocities of the cell.
+    pub fn kinks(&self) -> impl Fn(usize, &[[f64; 2]; NODES]) -> Option<(Kink, f64)> + Sync {
+        |cell, u| {
+            let cut = self.cut(cell)?;
+            let trust = 1.0 - cut.rest;
+            cut.kinked().map(|k| (k.kink, trust * k.amplitude(u)))
+        }
     }
 
     /// Calls `f` with each integration point of a cell and its shape functions.
@@ -185,7 +210,15 @@ impl Quadrature {
             return Ok(());
         }
         let Quadrature {
-            rule, composition, kinds, points, cut, mean_viscosity, compliance, ..
+            rule,
+            composition,
+            kinds,
+            ramps,
+            points,
+            cut,
+            mean_viscosity,
+            compliance,
+            ..
         } = self;
         // The volume fractions are written while the rest of the composition is read.
         let mut fractions = std::mem::take(&mut composition.fractions);
@@ -197,6 +230,7 @@ impl Quadrature {
             kinds,
             content: composition.contents(),
             factors: composition.factors(),
+            ramps,
             flow,
         };
         let cells = CellsMut {

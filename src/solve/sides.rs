@@ -34,13 +34,14 @@ use crate::composition::straight::StraightCut;
 use crate::laws::mixture::Mixture;
 use crate::laws::point::{PointLaw, Sym2};
 use crate::laws::rates::Rates;
+use crate::space::kink::{Kink, Ramp};
 use crate::space::measure::CellMeasure;
 use crate::space::shape::{GAUSS_6X6, GaussPoint, NODES};
 
 /// Logarithm to base 10 of the contrast up to which the velocity has its full kink.
-const KINKED: f64 = 2.0;
+const KINKED: f64 = 5.0;
 /// Logarithm to base 10 of the contrast from which the velocity has no kink.
-const KINKLESS: f64 = 3.0;
+const KINKLESS: f64 = 7.0;
 
 /// A cell that a line cuts into the sides of two materials.
 #[derive(Clone)]
@@ -49,48 +50,37 @@ pub struct Sides {
     pub between: [usize; 2],
     /// The line, with the shares of the second material.
     pub cut: StraightCut,
-    /// The kink of the velocity.
-    pub kink: Kink,
+    /// The kink of the velocity, if it has one.
+    pub kinked: Option<Kinked>,
 }
 
-/// Kink `psi t alpha` of the velocity at a line.
+/// Kink of the velocity of a cell, with its amplitude.
 #[derive(Clone)]
-pub struct Kink {
-    line: [f64; 3],
-    /// Values of `|d|` at the nodes.
-    at_nodes: [f64; NODES],
-    /// Tangent `t` of the line.
-    pub along: [f64; 2],
+pub struct Kinked {
+    /// The kink of amplitude one.
+    pub kink: Kink,
     /// Amplitude `alpha` as a linear form of the nodal velocities.
     pub amplitude: Nodal<2>,
+    /// Divergence of the kink of amplitude one against the pressures `1, xi, eta`.
+    pub divergence: [f64; 3],
 }
 
-impl Kink {
-    fn new(line: [f64; 3], [hx, hy]: [f64; 2]) -> Self {
-        let at = |r: [f64; 2]| line[0] + line[1] * r[0] + line[2] * r[1];
-        let at_nodes =
-            std::array::from_fn(|a| at([(a % 3) as f64 - 1.0, (a / 3) as f64 - 1.0]).abs());
-        let (nx, ny) = (line[1] / hx, line[2] / hy);
-        let length = nx.hypot(ny);
-        let along = [-ny / length, nx / length];
-        Kink { line, at_nodes, along, amplitude: [[0.0; 2]; NODES] }
+impl Kinked {
+    fn new(line: [f64; 3], ramp: Ramp, cell: CellMeasure) -> Self {
+        let kink = Kink::new(line, ramp, cell.size);
+        Kinked { kink, amplitude: [[0.0; 2]; NODES], divergence: [0.0; 3] }
     }
 
-    /// Values of `psi` at a point, continued from the first and from the second side.
-    pub fn values(&self, g: &GaussPoint) -> [f64; 2] {
-        let d = self.line[0] + self.line[1] * g.r[0] + self.line[2] * g.r[1];
-        let smooth: f64 = self.at_nodes.iter().zip(g.shape.n).map(|(d, n)| d * n).sum();
-        [d - smooth, -d - smooth]
+    /// Amplitude of the kink for the nodal velocities `u`.
+    pub fn amplitude<const D: usize>(&self, u: &Nodal<D>) -> f64 {
+        self.amplitude.iter().zip(u).map(|(f, u)| f[0] * u[0] + f[1] * u[1]).sum()
     }
 
     /// Rates of `psi t` at a point, continued from the first and from the second side.
-    fn rates(&self, s: &PointShape, [hx, hy]: [f64; 2]) -> [Rates; 2] {
-        let n = [self.line[1] * 2.0 / hx, self.line[2] * 2.0 / hy];
-        let smooth =
-            [&s.gx, &s.gy].map(|g| self.at_nodes.iter().zip(g).map(|(d, g)| d * g).sum::<f64>());
-        [1.0, -1.0].map(|sign| {
-            let slope = [sign * n[0] - smooth[0], sign * n[1] - smooth[1]];
-            Rates::classical(self.along.map(|t| slope.map(|s| s * t)))
+    fn rates(&self, g: &GaussPoint, size: [f64; 2]) -> [Rates; 2] {
+        self.kink.slopes(g).map(|slopes| {
+            let slopes = [0, 1].map(|c| slopes[c] * 2.0 / size[c]);
+            Rates::classical(self.kink.along.map(|t| slopes.map(|s| s * t)))
         })
     }
 
@@ -102,12 +92,12 @@ impl Kink {
         laws: &[PointLaw; 2],
         cell: CellMeasure,
         k: &mut VelocityMatrix,
-    ) {
+    ) -> bool {
         let [a, b] = laws.each_ref().map(|law| law.shear.mean());
         let decades = (a / b).log10().abs();
         let kept = ((KINKLESS - decades) / (KINKLESS - KINKED)).clamp(0.0, 1.0);
         if kept == 0.0 {
-            return;
+            return false;
         }
         let stiffer = usize::from(b > a);
         let difference = minus(&laws[stiffer], &laws[1 - stiffer]);
@@ -118,10 +108,13 @@ impl Kink {
         let mut itself = 0.0;
         for (g, &share) in GAUSS_6X6.iter().zip(&cut.share) {
             let s = PointShape::new(&g.shape, cell.size);
-            let rates = self.rates(&s, cell.size);
+            let rates = self.rates(g, cell.size);
             let shares = [1.0 - share, share];
             for side in 0..2 {
                 let volume = cell.of_point(g.weight * shares[side]);
+                for (divergence, q) in self.divergence.iter_mut().zip(cell.pressure_basis(g.r)) {
+                    *divergence += volume * q * rates[side].trace;
+                }
                 itself += volume * laws[side].power(&rates[side]);
                 add_forces(&mut coupled, &s, &laws[side], &rates[side], volume);
                 if side == stiffer {
@@ -130,7 +123,7 @@ impl Kink {
             }
         }
         if itself <= 0.0 {
-            return;
+            return false;
         }
         let alpha = driven.map(|d| -kept * d / itself);
         for i in 0..2 * NODES {
@@ -140,6 +133,8 @@ impl Kink {
                     alpha[i] * coupled[j] + coupled[i] * alpha[j] + alpha[i] * itself * alpha[j];
             }
         }
+        self.divergence[0] = 0.0;
+        true
     }
 }
 
@@ -166,7 +161,8 @@ pub fn matrix(
     cut: &StraightCut,
     laws: &[PointLaw; 2],
     cell: CellMeasure,
-) -> (VelocityMatrix, Kink) {
+    ramp: Option<Ramp>,
+) -> (VelocityMatrix, Option<Kinked>) {
     let mut k: VelocityMatrix = [[0.0; 2 * NODES]; 2 * NODES];
     for (g, &share) in GAUSS_6X6.iter().zip(&cut.share) {
         let mut mixture = Mixture::parallel();
@@ -180,15 +176,17 @@ pub fn matrix(
             add_forces(row, &s, &law, &Rates::classical(gradient), cell.of_point(g.weight));
         }
     }
-    let mut kink = Kink::new(cut.line, cell.size);
-    kink.eliminate(cut, laws, cell, &mut k);
+    let kinked = ramp.and_then(|ramp| {
+        let mut kinked = Kinked::new(cut.line, ramp, cell);
+        kinked.eliminate(cut, laws, cell, &mut k).then_some(kinked)
+    });
     // Rounding differs between the two halves.
     for i in 0..2 * NODES {
         for j in 0..i {
             k[j][i] = k[i][j];
         }
     }
-    (k, kink)
+    (k, kinked)
 }
 
 #[cfg(test)]
@@ -220,7 +218,8 @@ mod tests {
             for exponent in [-8, -4, 0, 4, 8] {
                 let thin = 10f64.powi(exponent).min(1.0);
                 let laws = [law(1.0), law(10f64.powi(exponent))];
-                let (k, _) = matrix(&cut(seed), &laws, Measure::PLANE.of_cell(SIZE));
+                let (k, _) =
+                    matrix(&cut(seed), &laws, Measure::PLANE.of_cell(SIZE), Ramp::new([false; 4]));
                 let k = SMatrix::<f64, 18, 18>::from_fn(|i, j| k[i][j]);
                 let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
                 values.sort_by(f64::total_cmp);
@@ -235,7 +234,7 @@ mod tests {
     #[test]
     fn equal_laws_give_the_uniform_matrix() {
         let cell = Measure::PLANE.of_cell(SIZE);
-        let (k, _) = matrix(&cut(3), &[law(2.0), law(2.0)], cell);
+        let (k, _) = matrix(&cut(3), &[law(2.0), law(2.0)], cell, Ramp::new([false; 4]));
         let mut uniform: Matrix = [[0.0; LOCAL]; LOCAL];
         for g in GAUSS_6X6.iter() {
             let shape = PointShape::new(&g.shape, SIZE);

@@ -3,7 +3,7 @@
 
 use super::flow::Flow;
 use super::mesh::Mesh;
-use super::shape::{GAUSS_3X3, NODES};
+use super::shape::{GAUSS_3X3, NODES, SIDE_NODES};
 
 /// Prescribed values of nodal unknowns, and the null spaces that remain.
 #[derive(Clone, Debug)]
@@ -41,6 +41,13 @@ impl<const D: usize> Constraints<D> {
     /// Prescribed value of component `c` of a node, if any.
     pub fn fixed_value(&self, node: usize, c: usize) -> Option<f64> {
         self.fixed[node][c].then_some(self.value[node][c])
+    }
+
+    /// Whether a velocity component is prescribed on all nodes of each side of a cell.
+    pub fn fixed_sides(&self, mesh: &Mesh, cell: usize) -> [bool; 4] {
+        let nodes = mesh.cell_nodes(cell);
+        let fixed = |side: [usize; 3], c| side.iter().all(|&a| self.is_fixed(nodes[a], c));
+        SIDE_NODES.map(|side| (0..2).any(|c| fixed(side, c)))
     }
 
     /// Declares a free rigid translation along `c`; its mean velocity will be zero.

@@ -5,6 +5,7 @@ pub mod constraints;
 pub mod fit;
 pub mod flow;
 pub mod incidence;
+pub mod kink;
 pub mod measure;
 pub mod mesh;
 pub mod neighbours;

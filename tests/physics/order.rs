@@ -39,9 +39,10 @@ fn points_and_directors_in_a_steady_vortex() {
         .collect();
     let enclosure = Enclosure::default();
     let moved = |steps: u32| {
-        let mut velocities = CellVelocities::new(&mesh, &enclosure);
+        let mut velocities = CellVelocities::new(&mesh, &enclosure, false);
         let dt = 1.0 / f64::from(steps);
-        let frozen_flow = FrozenFlow::new(&mesh, &enclosure, &mut velocities, &velocity, dt);
+        let frozen_flow =
+            FrozenFlow::new(&mesh, &enclosure, &mut velocities, &velocity, &|_, _| None, dt);
         let mut places = Vec::new();
         let mut directors = Vec::new();
         for k in 0..60 {

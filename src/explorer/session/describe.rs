@@ -99,6 +99,7 @@ pub(super) fn limited_by(limiter: Limiter) -> &'static str {
         Limiter::Relaxation => "relaxation of the strata",
         Limiter::Growth => "growth of the step",
         Limiter::Stop => "the next frame or change",
+        Limiter::Tolerance => "error of the displacements",
         Limiter::Guard => "a longer step that failed",
     }
 }

@@ -15,6 +15,12 @@ pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<Clock
             "cells crossed per step: above 0, at most 50; 0.5 is usual",
         ));
     }
+    if !(t.tolerance > 0.0 && t.tolerance <= 1.0) {
+        return Err(SceneError::new(
+            format!("time.tolerance is {}", t.tolerance),
+            "displacement error per step in cells: above 0, at most 1; 0.01 is usual",
+        ));
+    }
     if !(t.strain > 0.0 && t.strain <= 10.0) {
         return Err(SceneError::new(
             format!("time.strain is {}", t.strain),
@@ -47,6 +53,7 @@ pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<Clock
         end,
         max_step: max_step.map(|v| v / units.time),
         courant: t.courant,
+        tolerance: t.tolerance,
         strain: t.strain,
         stops,
         frames,

@@ -8,7 +8,7 @@ use crate::plan::Plan;
 use crate::scene::Quadrature as Rule;
 use crate::solve::density::{Density, MassPoint};
 use crate::solve::quadrature::Quadrature;
-use crate::solve::sides::Kink;
+use crate::solve::sides::Kinked;
 
 /// Points at which the densities of a cell are known.
 #[derive(Clone, Copy)]
@@ -39,20 +39,18 @@ impl<'a> Masses<'a> {
     }
 
     /// Kink of the velocity in a cell.
-    fn kink(&self, cell: usize) -> Option<&Kink> {
+    fn kinked(&self, cell: usize) -> Option<&Kinked> {
         match self {
-            Masses::Fitted(_, quadrature) => {
-                quadrature.cut(cell)?.sides.as_ref().map(|sides| &sides.kink)
-            }
+            Masses::Fitted(_, quadrature) => quadrature.kinked(cell),
             Masses::Points(_) => None,
         }
     }
 
     /// Adds the force `force` on the kink of a cell to the forces on its nodes.
     fn add_kinked(&self, cell: usize, force: [f64; 2], mut add: impl FnMut(usize, [f64; 2])) {
-        if let Some(kink) = self.kink(cell) {
+        if let Some(Kinked { kink, amplitude, .. }) = self.kinked(cell) {
             let along = force[0] * kink.along[0] + force[1] * kink.along[1];
-            for (a, alpha) in kink.amplitude.iter().enumerate() {
+            for (a, alpha) in amplitude.iter().enumerate() {
                 add(a, alpha.map(|alpha| along * alpha));
             }
         }
