@@ -69,7 +69,7 @@ impl Live {
         let run = sim::start(plan.clone())?;
         let mut warnings = session::warnings(&plan);
         warnings.extend(session::thinned(&plan, run.as_ref()));
-        let tally = Tally::new(run.row(), warnings);
+        let tally = Tally::new(warnings);
         status.begin(id, status::columns(&plan));
         let mut info = info::run_info(&plan, &plan.scene.name);
         info.recording_id = format!("{}-{id}", info.recording_id);

@@ -31,9 +31,11 @@ pub struct Mixture {
     /// Mean of the inverse deviatoric viscosities, or of the deviatoric viscosities if parallel.
     shear: Sym2,
     inverse_dilation: f64,
+    /// Mean of the inverse viscosities, if parallel.
+    fluidity: f64,
     /// Share of the materials with dilation, or the mean dilation if parallel.
     dilation_share: f64,
-    /// The sum of `phi_m eta_c,m / eta_m`, or of `phi_m eta_c,m` if parallel.
+    /// The sum of `phi_m eta_c,m / eta_m`.
     coupling: f64,
     couple: f64,
 }
@@ -61,7 +63,7 @@ impl Mixture {
             self.shear.add_scaled(phi, &law.shear);
             self.dilation_share += phi * law.dilation;
             self.coupling += phi * law.coupling / law.shear.mean();
-            self.inverse_dilation += phi / law.shear.mean();
+            self.fluidity += phi / law.shear.mean();
             return;
         }
         let shear = shifted(&law.shear, self.around);
@@ -77,7 +79,7 @@ impl Mixture {
     pub fn law(&self) -> PointLaw {
         if self.parallel {
             let (shear, dilation) = (self.shear, self.dilation_share);
-            let coupling = self.coupling / self.inverse_dilation;
+            let coupling = self.coupling / self.fluidity;
             return PointLaw { shear, dilation, coupling, couple: self.couple };
         }
         let shear = shifted(&self.shear.inverse(), -self.around);

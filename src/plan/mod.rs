@@ -303,6 +303,15 @@ impl Plan {
         self.effects.gravity || self.acceleration.is_some()
     }
 
+    /// Whether the potential energy of the particles and the work of loads determine the energy
+    /// balance: gravity acts, not along a periodic axis, no side is open, and volumes are constant.
+    pub fn energy_tells(&self) -> bool {
+        let (mesh, g) = (&self.mesh, self.state.gravity);
+        let along_seam = mesh.x.periodic() && g[0] != 0.0 || mesh.y.periodic() && g[1] != 0.0;
+        let constant = !self.enclosure.open.contains(&true) && !self.effects.volume_change;
+        self.effects.gravity && constant && !along_seam
+    }
+
     /// Rule for the integration points of cells. Without weight, [`Quadrature::Sides`] is
     /// [`Quadrature::Laminate`].
     pub fn rule_of_cells(&self) -> Quadrature {

@@ -3,6 +3,7 @@
 use super::logger::Traffic;
 use crate::scene::{Quadrature, scene_hash};
 use crate::sim::Run;
+use crate::sim::criteria::{ACCURATE_ENERGY, ENERGY_STEPS};
 use crate::sim::phases::Phases;
 use crate::sim::row::{GaugeRow, Row};
 use indexmap::IndexMap;
@@ -167,8 +168,6 @@ pub struct Tally {
     pub largest_power_error: f64,
     /// Largest relative error of the divergence.
     pub largest_divergence: f64,
-    /// Potential energy at the start (J/m).
-    pub first_energy: f64,
     /// Frames sent, dropped and delayed.
     pub traffic: Traffic,
     /// Time that the logger was busy (s).
@@ -192,13 +191,12 @@ pub struct Around {
 
 impl Tally {
     /// The tally of a run at its first instant.
-    pub fn new(first: &Row, warnings: Vec<String>) -> Tally {
+    pub fn new(warnings: Vec<String>) -> Tally {
         Tally {
             phases: Phases::default(),
             wall: 0.0,
             largest_power_error: 0.0,
             largest_divergence: 0.0,
-            first_energy: first.potential_energy,
             traffic: Traffic::default(),
             logger_seconds: 0.0,
             around: Around::default(),
@@ -214,25 +212,20 @@ impl Tally {
     }
 }
 
-/// Largest energy error without a warning.
-const ENERGY_TOLERANCE: f64 = 0.02;
-/// Smallest number of steps for a warning of the energy: the energy of a few steps is uncertain.
-const ENERGY_STEPS: u64 = 10;
-
 impl Summary {
     /// The warning that the energy lost is not the energy dissipated, with the likely cause for the
     /// quadrature rule of the run; `None` if the two agree.
     pub fn energy_warning(&self, rule: Quadrature) -> Option<String> {
-        let error = self.balances.energy_error.filter(|e| e.abs() > ENERGY_TOLERANCE)?;
+        let error = self.balances.energy_error.filter(|e| e.abs() > ACCURATE_ENERGY)?;
         if self.steps < ENERGY_STEPS {
             return None;
         }
         let remedy = match rule {
-            Quadrature::Sides => "raise accuracy.cells or lower time.courant",
+            Quadrature::Sides => "raise accuracy.cells or lower time.tolerance",
             Quadrature::Laminate | Quadrature::Mixture | Quadrature::Particles => {
                 "if a heavy material has a sloping surface under a thinner fluid, set \
                  accuracy.quadrature = \"sides\"; otherwise raise accuracy.cells or lower \
-                 time.courant"
+                 time.tolerance"
             }
         };
         let percent = 100.0 * error.abs();
@@ -274,10 +267,6 @@ impl Summary {
         let known: f64 = seconds.values().sum();
         seconds.insert("other", (tally.wall - known).max(0.0));
         seconds.insert("total", tally.wall);
-        let (mesh, g) = (&plan.mesh, plan.state.gravity);
-        let along_seam = mesh.x.periodic() && g[0] != 0.0 || mesh.y.periodic() && g[1] != 0.0;
-        let energy_tells = !along_seam && !plan.enclosure.open.contains(&true);
-        let lost = tally.first_energy - row.potential_energy + row.work;
         Summary {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
@@ -318,11 +307,7 @@ impl Summary {
                 divergence_error: tally.largest_divergence,
                 volume_error: row.volume_error,
                 director_error: row.director_error,
-                energy_error: energy_tells.then(|| {
-                    // A smaller difference is rounding: the scene is at rest.
-                    let scale = row.dissipated.max(1e-6 * tally.first_energy.abs());
-                    if scale > 0.0 { (lost - row.dissipated) / scale } else { 0.0 }
-                }),
+                energy_error: plan.energy_tells().then_some(row.energy_error),
             },
             population: [
                 ("splits", count.splits),

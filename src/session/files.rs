@@ -98,7 +98,7 @@ impl Session {
         let series_file = folder.join("series.csv");
         let series =
             SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
-        let mut tally = Tally::new(run.row(), warnings);
+        let mut tally = Tally::new(warnings);
         tally.around.set_up = clock.elapsed().as_secs_f64() - run.row().seconds.total();
         Ok(Session {
             scene_hash: scene_hash(&plan.scene),

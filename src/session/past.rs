@@ -33,7 +33,6 @@ impl Past {
                 wall,
                 t.largest_power_error,
                 t.largest_divergence,
-                t.first_energy,
                 traffic.waited.as_secs_f64(),
                 busy,
                 t.around.set_up,
@@ -59,7 +58,7 @@ impl Past {
     /// # Errors
     /// The state does not contain them.
     pub fn load(state: &State, folder: &Path) -> Result<Past, StateError> {
-        let [wall, power, divergence, energy, waited, busy, set_up, guard, writing] =
+        let [wall, power, divergence, waited, busy, set_up, guard, writing] =
             state.numbers("session.numbers")?;
         let [frames, drops, waits] = state.tally("session.frames")?;
         let waited = Duration::try_from_secs_f64(waited).unwrap_or_default();
@@ -74,7 +73,6 @@ impl Past {
                 wall,
                 largest_power_error: power,
                 largest_divergence: divergence,
-                first_energy: energy,
                 traffic,
                 logger_seconds: busy,
                 around: Around { set_up, guard, writing },

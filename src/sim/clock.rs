@@ -75,8 +75,8 @@ pub struct Speeds {
 /// two halves of an interval between frames, the next interval can be one step.
 const GROWTH: f64 = 2.0;
 
-/// Largest number of cells crossed in the first step.
-const FIRST_COURANT: f64 = 0.5;
+/// Share of the Courant number that limits the first step.
+const FIRST: f64 = 0.25;
 
 /// Length and limiter of the step that starts at `time`; `previous`: length of the previous step.
 pub fn next_step(
@@ -96,7 +96,7 @@ pub fn next_step(
     // The error of the first step is not known in advance.
     let courant = match speeds.tolerated {
         Some(_) => clock.courant,
-        None => clock.courant.min(FIRST_COURANT),
+        None => FIRST * clock.courant,
     };
     limit(courant / speeds.crossings, Limiter::Courant);
     limit(clock.strain / speeds.strain_rate, Limiter::Strain);

@@ -9,6 +9,9 @@ pub struct Criteria {
     pub power: f64,
     /// Divergence of the velocity relative to the strain rate, L2 norm.
     pub divergence: f64,
+    /// Potential energy lost plus work minus dissipated energy, over the dissipated energy, at the end
+    /// of a run of at least [`ENERGY_STEPS`] steps.
+    pub energy: f64,
     /// Number of solver corrections in a step, summed over its solutions.
     pub corrections: f64,
     /// Sum over cells of |volume of particles - area|, over the total area, relative to the share
@@ -34,11 +37,19 @@ pub struct Criteria {
     pub margin: f64,
 }
 
+/// Number of steps after which the energy balance is checked: the energy of a few steps is
+/// uncertain.
+pub const ENERGY_STEPS: u64 = 10;
+/// Largest energy error of an accurate run: a larger one causes a warning. That of [`CRITERIA`]
+/// holds for coarse meshes.
+pub const ACCURATE_ENERGY: f64 = 0.02;
+
 /// The bounds of all trials. The bound of the drift holds for a coarse mesh, on which a row of
 /// particles is a large part of an interface.
 pub const CRITERIA: Criteria = Criteria {
     power: 1e-6,
     divergence: 1e-9,
+    energy: 0.05,
     corrections: 40.0,
     misplaced: 1.0,
     drift: 0.05,

@@ -11,6 +11,10 @@ use crate::threads;
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
+/// Smallest dissipated energy, relative to the initial potential energy, that tells an error of the
+/// energy from rounding.
+const REST: f64 = 1e-6;
+
 /// SHA-256 hash, in hexadecimal, of the bits of all particle data except the marks for drawing.
 pub fn hash(p: &Particles) -> String {
     let mut h = Sha256::new();
@@ -154,6 +158,15 @@ impl<const D: usize> Simulation<D> {
         };
         let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
         let work = trapezoid(before.work, self.last_other_power, other);
+        let potential_energy = self.potential_energy() * u.energy();
+        if first {
+            self.first_energy = potential_energy;
+        }
+        let lost = self.first_energy - potential_energy + work;
+        // A smaller difference is rounding: the scene is at rest.
+        let scale = dissipated.max(REST * self.first_energy.abs());
+        let tells = plan.energy_tells() && scale > 0.0;
+        let energy_error = if tells { (lost - dissipated) / scale } else { 0.0 };
         // The lists of the previous row are reused.
         let mut drift = std::mem::take(&mut self.row.drift);
         drift.clear();
@@ -182,9 +195,10 @@ impl<const D: usize> Simulation<D> {
             max_speed: self.flow.max_speed() * u.velocity(),
             rms_speed: self.flow.rms_speed(&plan.mesh) * u.velocity(),
             volume_error: self.volume_error(),
-            potential_energy: self.potential_energy() * u.energy(),
+            potential_energy,
             work,
             dissipated,
+            energy_error,
         };
         let row = Row::measured(&measured, gauges, drift, seconds);
         self.last_other_power = other;

@@ -232,6 +232,8 @@ pub struct Measured<'a> {
     pub work: f64,
     /// See [`Row::dissipated`], J/m.
     pub dissipated: f64,
+    /// See [`Row::energy_error`].
+    pub energy_error: f64,
 }
 
 macro_rules! columns {
@@ -363,6 +365,13 @@ columns! {
     /// Time integral of the dissipation.
     dissipated: f64 = |m| m.dissipated, 0.0, {
         unit: "J/m", label: "dissipated energy", rank: Rank::Compared(6),
+    };
+    /// Potential energy lost since the start plus work minus dissipated energy, over the dissipated
+    /// energy; 0 at rest, and where the potential energy of the particles does not determine the
+    /// balance.
+    energy_error: f64 = |m| m.energy_error, 0.0, {
+        label: "energy error", format: Format::Exponent, path: "diagnostics/energy_error",
+        panel: Some(Panel::Balances), live: true,
     };
     /// Largest `| |n| - 1 |` of the directors; zero without directors.
     director_error: f64 = |m| m.particles.director_error(), 0.0, {

@@ -184,6 +184,7 @@ impl<const D: usize> Simulation<D> {
         s.put_counts("progress", [self.step, u64::from(self.version), self.next_change as u64]);
         s.put_floats("time", [self.time]);
         s.put_floats("tolerated", self.tolerated);
+        s.put_floats("first_energy", [self.first_energy]);
         s.put_floats("baseline", self.baseline.iter().copied());
         s.put_floats("other_power", [self.last_other_power]);
         save_row(&self.row, s);
@@ -224,6 +225,7 @@ impl<const D: usize> Simulation<D> {
             value: version.to_string(),
         })?;
         let [time] = s.numbers("time")?;
+        let [first_energy] = s.numbers("first_energy")?;
         let tolerated = s.floats("tolerated")?.first().copied();
         let baseline = s.exactly("baseline", materials)?;
         let [last_other_power] = s.numbers("other_power")?;
@@ -249,6 +251,7 @@ impl<const D: usize> Simulation<D> {
         (self.step, self.version, self.next_change) = (step, version, next_change as usize);
         self.time = time;
         self.tolerated = tolerated;
+        self.first_energy = first_energy;
         self.interest.update(mesh, self.quadrature.composition(), plan.background());
         self.baseline = baseline.to_vec();
         self.last_other_power = last_other_power;

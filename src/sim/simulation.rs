@@ -78,6 +78,8 @@ pub struct Simulation<const D: usize> {
     pub(super) baseline: Vec<f64>,
     /// Power of all loads except gravity at the last row, W/m.
     pub(super) last_other_power: f64,
+    /// Potential energy at the start, J/m.
+    pub(super) first_energy: f64,
     pub(super) row: Row,
     pub(super) report: Report,
     pub(super) events: Vec<String>,
@@ -151,6 +153,7 @@ impl<const D: usize> Simulation<D> {
             step: 0,
             baseline: vec![],
             last_other_power: 0.0,
+            first_energy: 0.0,
             row: Row::empty(plan.state.materials.len()),
             report: Report::default(),
             events: vec![],

@@ -15,6 +15,12 @@ use std::time::Instant;
 /// A step is shortened if the half-step velocity exceeds its Courant limit by this factor.
 const SURPRISE: f64 = 4.0;
 
+/// Largest displacement in the first step, whose error is not known in advance, that is due to the
+/// change of the velocity in half the step, in cells. A longer step is shortened.
+const FIRST_CHANGE: f64 = 0.25;
+/// Largest number of times that the first step is shortened for this reason.
+const FIRST_ATTEMPTS: u32 = 3;
+
 /// Largest factors by which the step of a given error rises and falls from one step to the next.
 const LARGEST_RISE: f64 = 1.25;
 /// See [`LARGEST_RISE`].
@@ -36,7 +42,7 @@ impl<const D: usize> Simulation<D> {
         {
             (dt, limiter) = (longest, Limiter::Guard);
         }
-        let mut extra = 0;
+        let (mut extra, mut shortened) = (0, 0);
         loop {
             self.attempted = dt;
             if dt.is_nan() || self.time + dt <= self.time {
@@ -49,10 +55,19 @@ impl<const D: usize> Simulation<D> {
             let counts = |node| self.interest.contains(node);
             let crossed = dt * self.crossings(|node| self.half[node], counts);
             let most = self.plan.clock.courant;
-            if crossed <= SURPRISE * most {
+            if crossed > SURPRISE * most {
+                (dt, limiter) = (dt * (most / crossed), Limiter::Courant);
+                continue;
+            }
+            if self.tolerated.is_some() || shortened == FIRST_ATTEMPTS {
                 break;
             }
-            (dt, limiter) = (dt * (most / crossed), Limiter::Courant);
+            let change = self.first_change(dt);
+            if change <= FIRST_CHANGE {
+                break;
+            }
+            shortened += 1;
+            (dt, limiter) = (dt * FIRST_CHANGE / change, Limiter::Tolerance);
         }
 
         let phase = Instant::now();
@@ -188,6 +203,14 @@ impl<const D: usize> Simulation<D> {
         self.particles = here;
         solved?;
         Ok(self.report.corrections)
+    }
+
+    /// Displacement in a first step of length `dt` that is due to the change of the velocity in half
+    /// the step, in cells.
+    fn first_change(&self, dt: f64) -> f64 {
+        let now = |node: usize, c: usize| self.flow.velocity[node][c];
+        let change = |node: usize| [0, 1].map(|c| self.half[node][c] - now(node, c));
+        dt * self.crossings(change, |node| self.interest.contains(node))
     }
 
     /// Length of the next step, after a step of length `dt` from the flow `before`, at which the

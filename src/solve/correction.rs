@@ -33,8 +33,7 @@ impl<const D: usize> Stokes<D> {
             let p: [f64; 3] =
                 std::array::from_fn(|q| -matrix.penalty[q] * residual.divergence[cell][q]);
             let mut force = [[0.0; D]; NODES];
-            let kinked = quadrature.kinked(cell);
-            Divergence::new(mesh.cell_measure(cell), kinked).add_transposed(&p, &mut force);
+            Divergence::new(mesh.cell_measure(cell)).add_transposed(&p, &mut force);
             let node = incidence.nodes[cell][CENTRE];
             let whole = std::array::from_fn(|c| force[CENTRE][c] + residual.force[node][c]);
             force[CENTRE] = free(node, whole);
@@ -82,8 +81,7 @@ impl<const D: usize> Stokes<D> {
             }
             share.force[CENTRE] = du[CENTRE];
             let measure = mesh.cell_measure(cell);
-            let bdu = Divergence::new(measure, quadrature.kinked(cell)).apply(&du);
-            let mass = measure.pressure_mass();
+            let (bdu, mass) = (Divergence::new(measure).apply(&du), measure.pressure_mass());
             for q in 0..3 {
                 let dp = -matrix.penalty[q] * (residual.divergence[cell][q] + bdu[q]);
                 share.sums[q] = dp;

@@ -305,12 +305,9 @@ impl Evaluation<'_> {
         scratch: &Gathered,
     ) -> CutStiffness {
         let laws = between.map(|m| self.law_at_centre(cell, m, scratch));
-        let (mut matrix, mut kinked) =
+        let (mut matrix, kinked) =
             sides::matrix(&cut, &laws, self.mesh.cell_measure(cell), self.ramps[cell]);
         matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);
-        if let Some(kinked) = &mut kinked {
-            kinked.divergence = kinked.divergence.map(|d| cut.trust * d);
-        }
         CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kinked }) }
     }
 

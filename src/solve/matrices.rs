@@ -184,7 +184,7 @@ impl<const D: usize> Fresh<D> {
                 self.matrix.diagonal[a][c] = k[NODES * c + a][NODES * c + a];
             }
         }
-        Divergence::new(measure, quadrature.kinked(cell)).add_penalty(&self.matrix.penalty, &mut k);
+        Divergence::new(measure).add_penalty(&self.matrix.penalty, &mut k);
         mirror::<D>(&mut k);
         for (a, node) in incidence.nodes[cell].into_iter().enumerate() {
             for c in 0..D {

@@ -80,11 +80,6 @@ impl CellMeasure {
         PRESSURE_MASS.map(|m| m * self.volume())
     }
 
-    /// Values of the pressure basis at reference coordinates.
-    pub fn pressure_basis(&self, r: [f64; 2]) -> [f64; 3] {
-        Measure { depth: self.depth }.pressure_basis(r)
-    }
-
     /// Factors of the divergence matrices of the reference cell (divided by its area) for `d/dx`
     /// and `d/dy`.
     #[inline(always)]

@@ -32,8 +32,8 @@ pub struct Trial {
     pub scene: SceneSource,
     /// Largest number of steps; the scene may end earlier.
     pub steps: u64,
-    /// True if the drift is not checked, because a material is smaller than a cell, changes its
-    /// volume or leaves the domain.
+    /// True if drift and energy balance are not checked, because a material is smaller than a cell,
+    /// changes its volume or leaves the domain.
     pub drifts: bool,
     /// Checks against a known result, if there is one.
     pub expect: Option<Expectation>,

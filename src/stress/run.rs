@@ -3,7 +3,7 @@
 use super::{Outcome, Trial, Verdict, judge};
 use crate::cases::{CaseError, plan_of};
 use crate::session::march;
-use crate::sim::criteria::CRITERIA;
+use crate::sim::criteria::{CRITERIA, ENERGY_STEPS};
 use crate::sim::{self, Run};
 use crate::space::mesh::Axis;
 use crate::threads;
@@ -49,6 +49,7 @@ impl First {
 struct Worst {
     power: f64,
     divergence: f64,
+    energy: f64,
     corrections: f64,
     misplaced: f64,
     drift: f64,
@@ -102,6 +103,7 @@ impl Worst {
         let mut out = vec![
             ("power balance", self.power, c.power),
             ("divergence", self.divergence, c.divergence),
+            ("energy balance", self.energy, c.energy),
             ("corrections", self.corrections, c.corrections),
             ("volume of cells", self.misplaced, c.misplaced),
             ("volume of particles", self.volume, c.volume),
@@ -173,6 +175,10 @@ impl Trial {
                 worst.observe(run, &first);
                 if *steps < self.steps { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             })?;
+        }
+        let row = run.row();
+        if !self.drifts && row.step >= ENERGY_STEPS {
+            raise(&mut worst.energy, row.energy_error.abs());
         }
         let mut checks = worst.checks(self.drifts);
         if let Some(expect) = &self.expect {

@@ -166,7 +166,7 @@ fn slumping(contrast: f64, cells: u32, rule: &str) -> SceneSource {
     let text = format!(
         "schema = 1\nname = \"slump\"\ngravity = [0, -10]\n[domain]\nx = [0, 4]\ny = [0, 1.5]\n\
          length_scale = 1\n[accuracy]\ncells = {cells}\nquadrature = \"{rule}\"\n\
-         [time]\nend = 5\ncourant = 2\n[boundaries]\nleft.kind = \"no_slip\"\n\
+         [time]\nend = 5\n[boundaries]\nleft.kind = \"no_slip\"\n\
          right.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
          [materials.mud]\ndensity = 1000\nshear_viscosity = 1000\n\
          [materials.air]\nshear_viscosity = \"1000/{contrast}\"\n\

@@ -134,7 +134,11 @@ fn relaxation(out: &mut Section) -> Result<(), CaseError> {
         curves: vec![],
     };
     for (name, value) in [("0.75 (default)", 0.75), ("0 (off)", 0.0)] {
-        let sets = [format!("accuracy.stabilisation={value}")];
+        let sets = [
+            format!("accuracy.stabilisation={value}"),
+            "time.courant=0.5".into(),
+            "time.tolerance=1".into(),
+        ];
         let mut run = start(&SceneSource::new("slosh", text.as_str()).with_sets(&sets)?)?;
         let tau = -AMPLITUDE / run.velocity_at([0.0, 0.5])[1];
         let first = run.row().max_speed;

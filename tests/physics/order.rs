@@ -100,6 +100,7 @@ fn directors_of_one_angle_in_a_sheared_layer() {
                 "time.end=0.2",
                 "time.strain=10",
                 "time.courant=50",
+                "time.tolerance=1",
                 "recording.frames=1",
                 "regions[0].director={ angle_degrees = 17.188733853924695 }",
                 &format!("time.max_step={step}"),
@@ -122,7 +123,7 @@ fn dye_and_directors_that_change_the_flow() {
     let moved = |step: f64| {
         let text = format!(
             "schema = 1\nname = \"cell\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\ncells = 8\nparticles_per_cell = 64\n\
-             [time]\nend = 0.4\nstrain = 10\ncourant = 50\nmax_step = {step:?}\n\
+             [time]\nend = 0.4\nstrain = 10\ncourant = 50\ntolerance = 1\nmax_step = {step:?}\n\
              [materials.a]\nshear_viscosity = 1\nlayer_viscosity = 0.2\n\
              [[regions]]\nmaterial = \"a\"\ndirector.angle_degrees = 22.918\n\
              [body_force]\nx = \"20*sin(3.14159265*x)*cos(3.14159265*y)\"\n\

@@ -5,7 +5,7 @@ use super::super::live::Live;
 use super::super::protocol::{DialState, Light, Reading, RunState, State, SwitchState};
 use super::*;
 use crate::sim::clock::Limiter;
-use crate::sim::criteria::CRITERIA;
+use crate::sim::criteria::{ACCURATE_ENERGY, CRITERIA, ENERGY_STEPS};
 use std::time::Instant;
 
 pub(super) fn milliseconds(seconds: f64) -> String {
@@ -74,6 +74,12 @@ pub(super) fn lights(live: &Live) -> Vec<Light> {
             row.divergence_error,
             divergence,
             "divergence of the flow relative to its strain rate",
+        ),
+        light(
+            "energy balance",
+            if row.step < ENERGY_STEPS { 0.0 } else { row.energy_error.abs() },
+            ACCURATE_ENERGY,
+            "relative difference of the energy lost since the start and the energy dissipated",
         ),
         light(
             "volume error",

@@ -8,17 +8,15 @@
 //! [`stokes`](crate::solve::stokes).
 
 use crate::solve::element::{Matrix, Nodal};
-use crate::solve::sides::Kinked;
 use crate::space::measure::CellMeasure;
 use crate::space::shape::{D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, NODES, Table};
 
 /// Divergence matrix of a cell for the pressure basis `1, xi, eta`, `integral q d/dx N` and
 /// `integral q d/dy N`: tables of the reference cell and the factors they are multiplied by.
 #[derive(Clone, Copy)]
-pub struct Divergence<'a> {
+pub struct Divergence {
     x_scale: f64,
     y_scale: f64,
-    kinked: Option<&'a Kinked>,
 }
 
 /// Matrices of a cell of size 2 x 2 for `d/dx` and `d/dy`, divided by its area.
@@ -39,11 +37,11 @@ const fn reference_divergence(slope: &Table) -> [[f64; NODES]; 3] {
     b
 }
 
-impl<'a> Divergence<'a> {
-    /// Divergence matrix of a cell, with the kink of its velocity.
-    pub fn new(cell: CellMeasure, kinked: Option<&'a Kinked>) -> Self {
+impl Divergence {
+    /// Divergence matrix of a cell.
+    pub fn new(cell: CellMeasure) -> Self {
         let [x_scale, y_scale] = cell.divergence_scales();
-        Divergence { x_scale, y_scale, kinked }
+        Divergence { x_scale, y_scale }
     }
 
     /// `B u`.
@@ -56,10 +54,7 @@ impl<'a> Divergence<'a> {
                 sum[1][q] += y[q][a] * u[a][1];
             }
         }
-        let smooth = [0, 1, 2].map(|q| self.x_scale * sum[0][q] + self.y_scale * sum[1][q]);
-        let Some(kinked) = self.kinked else { return smooth };
-        let amplitude = kinked.amplitude(u);
-        [0, 1, 2].map(|q| smooth[q] + kinked.divergence[q] * amplitude)
+        std::array::from_fn(|q| self.x_scale * sum[0][q] + self.y_scale * sum[1][q])
     }
 
     /// `f += B^T p`.
@@ -70,27 +65,14 @@ impl<'a> Divergence<'a> {
             f[a][0] += x[0][a] * px[0] + x[1][a] * px[1] + x[2][a] * px[2];
             f[a][1] += y[0][a] * py[0] + y[1][a] * py[1] + y[2][a] * py[2];
         }
-        if let Some(kinked) = self.kinked {
-            let power: f64 = kinked.divergence.iter().zip(p).map(|(b, p)| b * p).sum();
-            for (f, alpha) in f.iter_mut().zip(&kinked.amplitude) {
-                f[0] += power * alpha[0];
-                f[1] += power * alpha[1];
-            }
-        }
     }
 
     /// `k += B^T diag(w) B`, in the blocks of components on and below the diagonal.
     pub fn add_penalty(&self, w: &[f64; 3], k: &mut Matrix) {
         let [x, y] = &REFERENCE_DIVERGENCE;
         for q in 0..3 {
-            let mut bx = x[q].map(|v| v * self.x_scale);
-            let mut by = y[q].map(|v| v * self.y_scale);
-            if let Some(kinked) = self.kinked {
-                for (a, alpha) in kinked.amplitude.iter().enumerate() {
-                    bx[a] += kinked.divergence[q] * alpha[0];
-                    by[a] += kinked.divergence[q] * alpha[1];
-                }
-            }
+            let bx = x[q].map(|v| v * self.x_scale);
+            let by = y[q].map(|v| v * self.y_scale);
             for a in 0..NODES {
                 for b in 0..NODES {
                     k[a][b] += w[q] * bx[a] * bx[b];
