@@ -38,6 +38,8 @@ pub struct Column {
     pub live: bool,
     /// Whether the series of a plan has the column.
     pub exists: fn(&Plan) -> bool,
+    /// Name in the state of a run; empty for columns of gauges and materials.
+    pub(super) saved: &'static str,
     format: Format,
     access: Access,
 }
@@ -280,6 +282,7 @@ macro_rules! columns {
         pub static COLUMNS: &[Column] = &[
             $( Column {
                 name: stringify!($field),
+                saved: concat!("row.", stringify!($field)),
                 meaning: concat!($($doc),+),
                 access: Access {
                     number: |r, _| r.$field.number(),
@@ -461,6 +464,7 @@ impl Column {
     /// Default values of the fields.
     const PLAIN: Column = Column {
         name: "",
+        saved: "",
         symbol: "",
         unit: "",
         label: "",

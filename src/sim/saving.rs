@@ -107,7 +107,7 @@ fn save_row(row: &Row, s: &mut State) {
     s.put_floats("row.numbers", ROW_NUMBERS.map(|name| of_row(row, name)));
     s.put_floats("row.alignment", row.mean_alignment);
     for column in later_columns() {
-        s.put_floats(&format!("row.{}", column.name), [column.number(row)]);
+        s.put_floats(column.saved, [column.number(row)]);
     }
     s.put_floats("row.gauges", row.gauges.iter().flat_map(|g| [g.volume, g.rate]));
     s.put_floats("row.drift", row.drift.iter().copied());
@@ -143,7 +143,7 @@ fn load_row(s: &State, gauges: usize, materials: usize) -> Result<Row, StateErro
     // The text of a number is read back to the last bit.
     let list = ROW_NUMBERS.into_iter().zip(numbers);
     let later = later_columns().map(|c| {
-        let value = s.try_floats(&format!("row.{}", c.name)).and_then(|v| v.first().copied());
+        let value = s.try_floats(c.saved).and_then(|v| v.first().copied());
         (c.name, value.unwrap_or(f64::NAN))
     });
     list.chain(later).for_each(|(name, value)| {

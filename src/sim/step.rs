@@ -16,8 +16,8 @@ use std::time::Instant;
 const SURPRISE: f64 = 4.0;
 
 /// Largest displacement in the first step, whose error is not known in advance, that is due to the
-/// change of the velocity in half the step, in cells. A longer step is shortened.
-const FIRST_CHANGE: f64 = 0.25;
+/// change of the velocity in half the step, in units of the tolerance. A longer step is shortened.
+const FIRST_CHANGE: f64 = 2.5;
 /// Largest number of times that the first step is shortened for this reason.
 const FIRST_ATTEMPTS: u32 = 3;
 
@@ -62,12 +62,13 @@ impl<const D: usize> Simulation<D> {
             if self.tolerated.is_some() || shortened == FIRST_ATTEMPTS {
                 break;
             }
+            let most = FIRST_CHANGE * self.plan.clock.tolerance;
             let change = self.first_change(dt);
-            if change <= FIRST_CHANGE {
+            if change <= most {
                 break;
             }
             shortened += 1;
-            (dt, limiter) = (dt * FIRST_CHANGE / change, Limiter::Tolerance);
+            (dt, limiter) = (dt * most / change, Limiter::Tolerance);
         }
 
         let phase = Instant::now();

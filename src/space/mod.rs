@@ -1,6 +1,7 @@
 //! This module holds the discretisation in space: mesh, shape functions, constraints, particles and
 //! their resampling.
 
+mod carried;
 pub mod constraints;
 pub mod fit;
 pub mod flow;

@@ -9,12 +9,14 @@ use crate::cases::{
 use crate::scene::SceneSource;
 use crate::sim::SimError;
 
-/// The default rule, with which the others are compared.
+/// The default rule without weight, with which the others are compared.
 const DEFAULT: &str = "laminate";
-/// Assignment that selects the default rule.
+/// Assignment that selects this rule.
 const DEFAULT_SET: &str = "accuracy.quadrature=laminate";
 /// Values of `accuracy.quadrature` that are compared.
 const RULES: [&str; 3] = ["laminate", "mixture", "particles"];
+/// The default rule with weight.
+const DEFAULT_OF_WEIGHT: &str = "sides";
 /// Values of `accuracy.quadrature` that are compared on falling drops, which have weight.
 const RULES_OF_WEIGHT: [&str; 4] = ["laminate", "sides", "mixture", "particles"];
 /// Cases left out of the figure, whose legend has room for seven: their curves look the same as at
@@ -59,7 +61,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     let mut out = Section {
         title: "Interfaces inside cells",
         about: "Relative velocity errors, mean over three seeds of jittered particles, 16 per \
-                cell. `laminate` (default): the interface is reconstructed from the particles; the \
+                cell. `laminate` (default without weight): the interface is reconstructed from the particles; the \
                 two materials act in series for shear along it and in parallel for stretching \
                 along it; sheets and drops smaller than a cell have separate rules. `mixture`: \
                 Gauss points with the local harmonic mixture of the cell's particles. `particles`: \
@@ -204,26 +206,25 @@ fn drops(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     header.extend(RULES_OF_WEIGHT);
     let mut table = Table::new(
         "Falling drops of Cosserat and layered fluid in a fluid of different viscosity: largest \
-         speed at 16 cells over that at 64 cells with the default rule.",
+         speed at 16 cells over that at 64 cells with the same rule. `sides` is the default for \
+         materials of different weight.",
         &header,
     );
     let cosserat = "coupling_viscosity = 1\ninternal_length = 0.25";
     let layered = "layer_viscosity = 0.1";
     for (name, drop) in effort.take(&[("Cosserat", cosserat), ("layered", layered)]) {
         for around in effort.take(&["1e-3", "0.1", "1", "1e3"]) {
-            let fine = fall(drop, around, 64, DEFAULT)?;
             let mut row = vec![name.to_string(), around.to_string()];
             for rule in RULES_OF_WEIGHT {
-                let ratio = fall(drop, around, 16, rule)? / fine;
+                let ratio = fall(drop, around, 16, rule)? / fall(drop, around, 64, rule)?;
                 row.push(format!("{ratio:.3}"));
+                let what = || format!("{name} drop in {around}, {rule}: speed at 16 cells over 64");
                 // The speed of a drop that is a thousand times softer than its surroundings
-                // depends on its boundary and converges only with many more cells.
+                // depends on its boundary; a laminate needs many more cells.
                 if rule == DEFAULT && *around != "1e3" {
-                    out.check(
-                        format!("{name} drop in {around}: speed at 16 cells over that at 64"),
-                        ratio,
-                        Bound::Within(1.0, 0.03),
-                    );
+                    out.check(what(), ratio, Bound::Within(1.0, 0.03));
+                } else if rule == DEFAULT_OF_WEIGHT {
+                    out.aim(what(), ratio, Bound::Within(1.0, 0.03));
                 }
             }
             table.rows.push(row);
