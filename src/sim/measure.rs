@@ -1,6 +1,7 @@
 //! This module computes the diagnostics of a state.
 
 use super::clock::{Limiter, Speeds};
+use super::criteria::ACCURATE_ENERGY;
 use super::phases::Phases;
 use super::row::{GaugeRow, Measured, Row};
 use super::simulation::Simulation;
@@ -14,6 +15,12 @@ use std::time::Instant;
 /// Smallest dissipated energy, relative to the initial potential energy, that tells an error of the
 /// energy from rounding.
 const REST: f64 = 1e-6;
+
+/// Weight of all earlier steps in the energies of the last steps, relative to the next step.
+const MEMORY: f64 = 0.8;
+/// Smallest factor on the step because of the energy: the displacement error of the step is then a
+/// tenth of its tolerance.
+const SHORTEST: f64 = 0.46;
 
 /// SHA-256 hash, in hexadecimal, of the bits of all particle data except the marks for drawing.
 pub fn hash(p: &Particles) -> String {
@@ -43,7 +50,7 @@ impl<const D: usize> Simulation<D> {
         let moving = |node: usize| [velocity[node][0], velocity[node][1]];
         let mut speeds = Speeds {
             crossings: self.crossings(moving, |node| self.interest.contains(node)),
-            tolerated: self.tolerated,
+            tolerated: self.tolerated.map(|dt| dt * self.energy_factor()),
             strain_rate: 0.0,
             relaxation: self.matter.relaxation,
         };
@@ -63,6 +70,16 @@ impl<const D: usize> Simulation<D> {
             }
         }
         speeds
+    }
+
+    /// Factor on the step that the displacement error allows: below one if the energy lost in the
+    /// last steps is not the energy dissipated. An error that does not fall with the step (that of a
+    /// coarse mesh) shortens steps by no more than [`SHORTEST`].
+    fn energy_factor(&self) -> f64 {
+        let [lost, dissipated] = self.recent_energy;
+        let error = (lost - dissipated).abs() / dissipated;
+        // Without dissipation there is no error.
+        if error > ACCURATE_ENERGY { (ACCURATE_ENERGY / error).sqrt().max(SHORTEST) } else { 1.0 }
     }
 
     /// Largest number of cells crossed per unit time with given nodal velocities, of the nodes that
@@ -167,6 +184,15 @@ impl<const D: usize> Simulation<D> {
         let scale = dissipated.max(REST * self.first_energy.abs());
         let tells = plan.energy_tells() && scale > 0.0;
         let energy_error = if tells { (lost - dissipated) / scale } else { 0.0 };
+        if tells && !first {
+            let of_step = [
+                before.potential_energy - potential_energy + work - before.work,
+                dissipated - before.dissipated,
+            ];
+            for (recent, now) in self.recent_energy.iter_mut().zip(of_step) {
+                *recent = MEMORY * *recent + now;
+            }
+        }
         // The lists of the previous row are reused.
         let mut drift = std::mem::take(&mut self.row.drift);
         drift.clear();

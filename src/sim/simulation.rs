@@ -78,6 +78,8 @@ pub struct Simulation<const D: usize> {
     pub(super) baseline: Vec<f64>,
     /// Power of all loads except gravity at the last row, W/m.
     pub(super) last_other_power: f64,
+    /// Energy lost and energy dissipated in the last steps, J/m, later steps weighted more.
+    pub(super) recent_energy: [f64; 2],
     /// Potential energy at the start, J/m.
     pub(super) first_energy: f64,
     pub(super) row: Row,
@@ -154,6 +156,7 @@ impl<const D: usize> Simulation<D> {
             baseline: vec![],
             last_other_power: 0.0,
             first_energy: 0.0,
+            recent_energy: [0.0; 2],
             row: Row::empty(plan.state.materials.len()),
             report: Report::default(),
             events: vec![],

@@ -56,7 +56,8 @@ fn every_preset_runs_and_leaves_its_files() {
     let here = TempFolder::new();
     for (name, text) in preset_files() {
         let coarse = if name.starts_with("silo") { "accuracy.cells=3" } else { "accuracy.cells=4" };
-        let run = ["run", &name, "--set", coarse, "--steps", "2"];
+        let short = "time.courant=0.5";
+        let run = ["run", &name, "--set", coarse, "--set", short, "--steps", "2"];
         here.grainscope(&run).exits(0).prints(&["2 steps", &format!("folder: runs/{name}")]);
         let file = |file: &str| format!("runs/{name}/{file}");
 
