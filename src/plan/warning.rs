@@ -79,9 +79,8 @@ impl fmt::Display for Warning {
             Warning::ThinFluid { dense, thin, ratio } => write!(
                 f,
                 "`{dense}` is {ratio:.0e} times as viscous as the lighter `{thin}`: detached \
-                 drops of it fall much faster than it flows, and time steps become short \
-                 accordingly; a ratio of 1e3 or 1e4 gives a similar flow, and \
-                 accuracy.quadrature = \"sides\" the right one where its surface slopes"
+                 drops of it fall much faster than it flows; a ratio of 1e3 or 1e4 gives a \
+                 similar flow in less time"
             ),
             Warning::StiffLayers { material, ratio } => write!(
                 f,
