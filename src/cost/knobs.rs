@@ -8,8 +8,12 @@ pub const KNOBS: [(&str, &str, &str); 7] = [
     ("cells", "accuracy.cells", "fewer and more cells, by factors of sqrt 2"),
     ("grading", "mesh.grading", "none, and smaller or larger cells where the mesh is graded"),
     ("particles", "accuracy.particles_per_cell", "square numbers from 4"),
-    ("quadrature", "accuracy.quadrature", "particles, mixture, laminate: the cut-cell rule"),
-    ("time step", "time.courant, time.strain, time.max_step", "all three by one factor"),
+    ("quadrature", "accuracy.quadrature", "particles, mixture, laminate, sides: the cut-cell rule"),
+    (
+        "time step",
+        "time.courant, time.strain, time.max_step, time.tolerance",
+        "by one factor, the tolerance by its cube",
+    ),
     ("integrator", "accuracy.integrator", "euler, extrapolated, midpoint"),
     ("tolerance", "accuracy.tolerance", "1e-5, 1e-8 and the scene's own"),
 ];
@@ -192,6 +196,8 @@ fn stepped(scene: &Scene, scope: &Scope, factor: f64) -> Result<Vec<String>, Sce
     let mut sets = vec![
         format!("time.courant={}", scene.time.courant * factor),
         format!("time.strain={}", scene.time.strain * factor),
+        // The error of a step is of third order in its length.
+        format!("time.tolerance={}", (scene.time.tolerance * factor.powi(3)).min(1.0)),
     ];
     if let Some(dt) = &scene.time.max_step {
         sets.push(format!("time.max_step={:e}", dt.eval(scope)? * factor));

@@ -6,13 +6,13 @@
 //! material has exactly that law for any positions of its particles, so its element matrix is a
 //! constant.
 //!
-//! **Laminate** (default). As the mixture, but the viscous stiffness of cells with two materials is
+//! **Laminate**. As the mixture, but the viscous stiffness of cells with two materials is
 //! that of [`laminate`](super::laminate), with the interface found by the composition. Where no
 //! interface can be trusted (three materials, debris) the mixture is used. A stiff sheet thinner
 //! than a cell is a laminate with straight edges; the cells of a drop are a dilute suspension.
 //! Rotation, density and images are those of the mixture.
 //!
-//! **Sides**. As the laminate, but cells whose materials differ in density are treated differently.
+//! **Sides** (default). As the laminate, but cells whose materials differ in density are treated differently.
 //! Where a straight line separates two materials, each side has its own law and its own weight
 //! ([`sides`](super::sides)); elsewhere the mean laws are arithmetic. In series, the thin material
 //! would make a cell that is mostly heavy as soft as itself, and the weight of that cell would make
@@ -48,7 +48,7 @@ pub struct Quadrature {
     pub(super) start: Vec<u32>,
     /// Ramp of the kink that the velocity of each cell may have.
     ramps: Vec<Option<Ramp>>,
-    /// Stiffness of cut cells under the laminate rule.
+    /// Stiffness of cut cells.
     cut: Vec<Option<Box<CutStiffness>>>,
     /// Mean viscosity of each cell; where a laminate is used, the mean by volume. It scales the
     /// penalty.

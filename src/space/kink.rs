@@ -112,3 +112,55 @@ impl Kink {
         self.at_nodes.map(|d| -d)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::shape::{GAUSS_6X6, Shape};
+
+    const LINE: [f64; 3] = [0.13, 0.8, -0.5];
+    const SIZE: [f64; 2] = [0.7, 1.3];
+
+    /// Value of `psi` at a point.
+    fn psi(kink: &Kink, r: [f64; 2]) -> f64 {
+        let n = Shape::values(r);
+        kink.edge(r) + kink.biquadratic().iter().zip(n).map(|(d, n)| d * n).sum::<f64>()
+    }
+
+    #[test]
+    fn kinks_are_zero_at_nodes_and_on_fixed_sides() {
+        for fixed in [[false; 4], [true, false, false, false], [false, true, true, false]] {
+            let kink = Kink::new(LINE, Ramp::new(fixed).unwrap(), SIZE);
+            for a in 0..NODES {
+                let r = [(a % 3) as f64 - 1.0, (a / 3) as f64 - 1.0];
+                assert!(psi(&kink, r).abs() < 1e-15, "{fixed:?} {r:?}");
+            }
+            for t in [-0.7, -0.2, 0.4, 0.9] {
+                let points = [[-1.0, t], [1.0, t], [t, -1.0], [t, 1.0]];
+                for (r, _) in points.into_iter().zip(fixed).filter(|(_, fixed)| *fixed) {
+                    assert!(psi(&kink, r).abs() < 1e-15, "{fixed:?} {r:?}");
+                }
+            }
+        }
+        assert!(Ramp::new([true, true, false, false]).is_none());
+    }
+
+    #[test]
+    fn values_and_slopes_are_those_of_the_side_of_the_point() {
+        let kink = Kink::new(LINE, Ramp::new([true, false, false, true]).unwrap(), SIZE);
+        let step = 1e-6;
+        for g in GAUSS_6X6.iter() {
+            let side = usize::from(kink.distance(g.r) < 0.0);
+            assert!((kink.values(g)[side] - psi(&kink, g.r)).abs() < 1e-15);
+            for c in 0..2 {
+                let (mut low, mut high) = (g.r, g.r);
+                low[c] -= step;
+                high[c] += step;
+                let slope = |f: &dyn Fn([f64; 2]) -> f64| (f(high) - f(low)) / (2.0 * step);
+                let of_psi = slope(&|r| psi(&kink, r));
+                assert!((kink.slopes(g)[side][c] - of_psi).abs() < 1e-8);
+                assert!((kink.slopes_of_edge(g.r)[c] - slope(&|r| kink.edge(r))).abs() < 1e-8);
+            }
+        }
+    }
+}
