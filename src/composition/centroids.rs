@@ -58,8 +58,8 @@ impl Centroids {
         }
     }
 
-    /// Computes the shares and the shifted centroids of the gathered particles. The volume of each material is multiplied by its factor; `viscosity` yields that of each material of the
-    /// scene.
+    /// Computes the shares and the shifted centroids of the gathered particles. The volume of each
+    /// material is multiplied by its factor; `viscosity` yields that of each material of the scene.
     pub fn finish(&mut self, factors: &[f64], viscosity: impl Iterator<Item = f64> + Clone) {
         let total: f64 = self.parts.iter().zip(factors).map(|(p, f)| p.volume * f).sum();
         let (mut offset, mut give, mut held) = ([0.0; 2], 0.0, 0.0);

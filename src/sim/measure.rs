@@ -49,7 +49,7 @@ impl<const D: usize> Simulation<D> {
         let velocity = &self.flow.velocity;
         let moving = |node: usize| [velocity[node][0], velocity[node][1]];
         let mut speeds = Speeds {
-            crossings: self.crossings(moving, |node| self.interest.contains(node)),
+            crossings: self.crossings_of_interest(moving),
             tolerated: self.tolerated.map(|dt| dt * self.energy_factor()),
             strain_rate: 0.0,
             relaxation: self.matter.relaxation,
@@ -80,6 +80,11 @@ impl<const D: usize> Simulation<D> {
         let error = (lost - dissipated).abs() / dissipated;
         // Without dissipation there is no error.
         if error > ACCURATE_ENERGY { (ACCURATE_ENERGY / error).sqrt().max(SHORTEST) } else { 1.0 }
+    }
+
+    /// [`Simulation::crossings`] of the materials of interest.
+    pub(super) fn crossings_of_interest(&self, velocity: impl Fn(usize) -> [f64; 2]) -> f64 {
+        self.crossings(velocity, |node| self.interest.contains(node))
     }
 
     /// Largest number of cells crossed per unit time with given nodal velocities, of the nodes that

@@ -52,8 +52,7 @@ impl<const D: usize> Simulation<D> {
             extra += self.find_half_step_velocity(dt, &mut seconds)?;
             // At the start of a flow, the half-step velocity can be much larger than the current
             // one.
-            let counts = |node| self.interest.contains(node);
-            let crossed = dt * self.crossings(|node| self.half[node], counts);
+            let crossed = dt * self.crossings_of_interest(|node| self.half[node]);
             let most = self.plan.clock.courant;
             if crossed > SURPRISE * most {
                 (dt, limiter) = (dt * (most / crossed), Limiter::Courant);
@@ -211,7 +210,7 @@ impl<const D: usize> Simulation<D> {
     fn first_change(&self, dt: f64) -> f64 {
         let now = |node: usize, c: usize| self.flow.velocity[node][c];
         let change = |node: usize| [0, 1].map(|c| self.half[node][c] - now(node, c));
-        dt * self.crossings(change, |node| self.interest.contains(node))
+        dt * self.crossings_of_interest(change)
     }
 
     /// Length of the next step, after a step of length `dt` from the flow `before`, at which the
@@ -226,13 +225,10 @@ impl<const D: usize> Simulation<D> {
     /// ```
     fn tolerated_step(&self, before: &Flow<D>, dt: f64) -> f64 {
         let error = dt
-            * self.crossings(
-                |node| {
-                    let (u, v) = (before.velocity[node], self.flow.velocity[node]);
-                    [0, 1].map(|c| self.half[node][c] - 0.5 * (u[c] + v[c]))
-                },
-                |node| self.interest.contains(node),
-            );
+            * self.crossings_of_interest(|node| {
+                let (u, v) = (before.velocity[node], self.flow.velocity[node]);
+                [0, 1].map(|c| self.half[node][c] - 0.5 * (u[c] + v[c]))
+            });
         let order = if self.plan.method.integrator == Integrator::Euler { 2.0 } else { 3.0 };
         let next = dt * (self.plan.clock.tolerance / error).powf(1.0 / order);
         let longest = LARGEST_RISE * self.tolerated.unwrap_or(dt).max(dt);

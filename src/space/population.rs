@@ -172,6 +172,11 @@ impl Population {
         any
     }
 
+    /// Particles that a cell needs at most.
+    fn largest_need(&self) -> Need {
+        Need { least: (self.target() / 2).max(1), quadrants: self.target() >= 4 }
+    }
+
     /// Particles that a cell needs.
     fn need(&self, particles: &Particles, cell: usize) -> Need {
         let carries = particles.director.is_some()
@@ -183,29 +188,16 @@ impl Population {
         if !carries && own.chain(around).all(|p| particles.material[p] == first) {
             Need { least: (self.target() / 4).max(1), quadrants: false }
         } else {
-            Need { least: (self.target() / 2).max(1), quadrants: self.target() >= 4 }
+            self.largest_need()
         }
     }
 
     /// Whether a cell that is not empty has fewer particles than it needs.
     fn lacks(&self, mesh: &Mesh, particles: &Particles, cell: usize) -> bool {
-        let members = particles.of_cell(cell);
-        if members.is_empty() {
-            return false;
-        }
-        let Need { least, quadrants } = self.need(particles, cell);
-        if members.len() < least {
-            return true;
-        }
-        let (centre, [hx, hy]) = (mesh.cell_centre(cell), mesh.cell_size(cell));
-        let mut held = [false; 4];
-        for p in &particles.position[members] {
-            let r = [2.0 * (p[0] - centre[0]) / hx, 2.0 * (p[1] - centre[1]) / hy];
-            for (q, held) in held.iter_mut().enumerate() {
-                *held |= holds(&quadrant(q), &r);
-            }
-        }
-        quadrants && held.contains(&false)
+        // Most cells have enough by the largest need, which is known without their neighbours.
+        !particles.of_cell(cell).is_empty()
+            && falls_short(mesh, particles, cell, self.largest_need())
+            && falls_short(mesh, particles, cell, self.need(particles, cell))
     }
 
     /// Position (reference coordinates) for a new particle: the centre of an empty quadrant, or, if
@@ -272,6 +264,23 @@ impl Population {
             particles.sort(mesh);
         }
     }
+}
+
+/// Whether a cell has fewer particles than a need.
+fn falls_short(mesh: &Mesh, particles: &Particles, cell: usize, need: Need) -> bool {
+    let members = particles.of_cell(cell);
+    if members.len() < need.least {
+        return true;
+    }
+    let (centre, [hx, hy]) = (mesh.cell_centre(cell), mesh.cell_size(cell));
+    let mut held = [false; 4];
+    for p in &particles.position[members] {
+        let r = [2.0 * (p[0] - centre[0]) / hx, 2.0 * (p[1] - centre[1]) / hy];
+        for (q, held) in held.iter_mut().enumerate() {
+            *held |= holds(&quadrant(q), &r);
+        }
+    }
+    need.quadrants && held.contains(&false)
 }
 
 /// Centre of the quadrant `q` in reference coordinates.

@@ -36,8 +36,8 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         title: "Sloping free surfaces",
         about:
             "A heavy fluid under a light one a hundred to a million times thinner, with no slip \
-                on all walls. `sides` (default): where materials of different weight share a cell, each has \
-                its own stiffness and weight on its side of a straight line. `laminate`: \
+                on all walls. `sides` (default): where materials of different weight share a cell, \
+                each has its own stiffness and weight on its side of a straight line. `laminate`: \
                 the materials act in series in shear, so a cell that is mostly heavy is as weak as \
                 the light fluid, and its weight drives the light fluid. `particles`: particles as \
                 integration points (the source)."
