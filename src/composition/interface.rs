@@ -124,21 +124,6 @@ impl Surroundings {
         self.particles.clear();
         let [cx, cy] = mesh.cell_centre(cell);
         let [hx, hy] = mesh.cell_size(cell);
-        let period = |periodic: bool, length: f64| if periodic { length } else { f64::INFINITY };
-        let (lx, ly) = (
-            period(mesh.x.periodic(), mesh.x.length()),
-            period(mesh.y.periodic(), mesh.y.length()),
-        );
-        // The nearest periodic image; without periodicity the period is infinite.
-        let nearest = |d: f64, l: f64| {
-            if d > 0.5 * l {
-                d - l
-            } else if d < -0.5 * l {
-                d + l
-            } else {
-                d
-            }
-        };
         for near in mesh.block(cell) {
             if mesh.solid[near] {
                 continue;
@@ -149,7 +134,7 @@ impl Surroundings {
                     continue;
                 }
                 let [x, y] = particles.position[p];
-                let at = [nearest(x - cx, lx) / hx, nearest(y - cy, ly) / hy];
+                let at = [mesh.x.nearest_image(x - cx) / hx, mesh.y.nearest_image(y - cy) / hy];
                 self.particles.push((at, m == b));
             }
         }

@@ -112,7 +112,8 @@ impl<const D: usize> Simulation<D> {
             self.flow.extrapolate(&previous.flow, dt / previous.dt);
         }
         let solved = self.solve(ahead.flatten().map(|t| (t, &before)), &mut seconds);
-        self.tolerated = Some(self.tolerated_step(&before, dt));
+        // The step after a sudden change is chosen as the first one.
+        self.tolerated = (!changed).then(|| self.tolerated_step(&before, dt));
         let older = self.previous.take();
         if changed {
             self.spare = before;

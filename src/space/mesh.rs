@@ -145,6 +145,21 @@ impl Axis {
             after
         }
     }
+
+    /// The shortest distance between periodic images of two points whose coordinates differ by `d`;
+    /// without periodicity it is `d`.
+    pub fn nearest_image(&self, d: f64) -> f64 {
+        let length = self.length();
+        if !self.periodic {
+            d
+        } else if d > 0.5 * length {
+            d - length
+        } else if d < -0.5 * length {
+            d + length
+        } else {
+            d
+        }
+    }
 }
 
 /// Tensor-product mesh of rectangles. Cell `(i, j)` has index `j nx + i`.
