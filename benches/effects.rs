@@ -89,7 +89,7 @@ fn recording() -> Outcome<()> {
     let plan = plan_of(&source("silo", &[])?)?;
     let file = std::env::temp_dir().join(format!("grainscope-bench-{}.rrd", std::process::id()));
     let log = RerunLog::open(&info::run_info(&plan, "bench"), &[Sink::Save(file.clone())])?;
-    let mut logger = Logger::start(log, Backpressure::Wait)?;
+    let mut logger = Logger::start(log, Backpressure::Wait, std::sync::Arc::default())?;
     let mut run = sim::start(plan.clone())?;
     run.step()?;
     let (mut step, mut frame) = (0.0, 0.0);

@@ -12,7 +12,7 @@
 //!
 //! The rest is private: how a step is computed (`space`, `composition`, `solve`, `motion`), how runs are
 //! driven, recorded, read back and compared (`session`, `record`, `results`, `compare`, `export`,
-//! `sweep`, `explorer`), and what is measured (`cases`, `verify`, `stress`, `cost`).
+//! `sweep`, `explorer`, `web`), and what is measured (`cases`, `verify`, `stress`, `cost`).
 //!
 //! ```
 //! use grainscope::{plan, scene, sim};
@@ -62,3 +62,4 @@ pub(crate) mod sweep;
 pub(crate) mod testing;
 pub mod threads;
 pub(crate) mod verify;
+pub(crate) mod web;

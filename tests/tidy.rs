@@ -5,12 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the library, lowest layer first, and the modules that each may import.
-const MODULES: [(&str, &[&str]); 24] = [
+const MODULES: [(&str, &[&str]); 25] = [
     ("testing", &[]),
     ("threads", &[]),
     ("simd", &[]),
     ("laws", &[]),
     ("frame", &[]),
+    ("web", &[]),
     ("scene", &[]),
     ("space", &["laws", "scene", "threads"]),
     ("composition", &["laws", "space", "threads"]),
@@ -23,7 +24,7 @@ const MODULES: [(&str, &[&str]); 24] = [
     ),
     ("cases", &["laws", "scene", "space", "plan", "solve", "sim"]),
     ("verify", &["scene", "plan", "sim", "cases"]),
-    ("record", &["frame", "scene", "space", "plan", "sim"]),
+    ("record", &["frame", "scene", "space", "plan", "sim", "web"]),
     ("session", &["frame", "scene", "plan", "sim", "record", "threads"]),
     ("cost", &["scene", "space", "plan", "sim", "cases", "session", "testing", "threads"]),
     ("stress", &["scene", "plan", "sim", "cases", "verify", "session", "space", "threads"]),
@@ -31,7 +32,7 @@ const MODULES: [(&str, &[&str]); 24] = [
     ("compare", &["frame", "scene", "plan", "record", "results"]),
     ("export", &["frame", "results"]),
     ("sweep", &["scene", "plan", "sim", "record", "testing", "simd"]),
-    ("explorer", &["frame", "scene", "plan", "sim", "cost", "record", "session"]),
+    ("explorer", &["frame", "scene", "plan", "sim", "cost", "record", "session", "web"]),
     (
         "commands",
         &[

@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let path = args.output.clone().unwrap_or_else(|| default_output(&members));
         let mut sinks = vec![Sink::Save(path.clone())];
         if args.serve || args.open {
-            sinks.push(Sink::Serve { web_port: args.port, grpc_port: 0 });
+            sinks.push(Sink::Serve { port: args.port });
         }
         write(found, &members, &path, &sinks)?
     };

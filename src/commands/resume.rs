@@ -48,7 +48,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     super::memory::afford(&plan)?;
     let (plan, hash) = (Arc::new(plan), scene_hash(&scene));
     let interrupted = watch_interrupts(super::code::INTERRUPTED);
-    let viewers = args.serve.then_some(Sink::Serve { web_port: args.port, grpc_port: 0 });
+    let viewers = args.serve.then_some(Sink::Serve { port: args.port });
     let options = Options {
         viewers: viewers.into_iter().collect(),
         safety: args.safety,

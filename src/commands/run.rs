@@ -79,7 +79,7 @@ impl Args {
     fn options(&self) -> Options {
         let mut viewers = Vec::new();
         if self.serve {
-            viewers.push(Sink::Serve { web_port: self.port, grpc_port: 0 });
+            viewers.push(Sink::Serve { port: self.port });
         }
         viewers.extend(self.connect.clone().map(Sink::Connect));
         viewers.extend(self.spawn.then_some(Sink::Spawn));

@@ -25,13 +25,13 @@ mod session;
 mod stage;
 mod status;
 
-use crate::record::rerun_log::{ViewerFile, viewer_file};
 use crate::scene::SceneSource;
+use crate::web;
+use crate::web::guard::Guard;
 use crossbeam::channel::bounded;
 use library::Library;
 use session::Session;
 use status::Status;
-use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -92,18 +92,18 @@ pub struct Explorer {
 impl Explorer {
     /// Starts the session and serves its page.
     pub fn open(settings: Settings) -> Result<Explorer, ExplorerError> {
-        if viewer_file(ViewerFile::Program).is_none() {
-            return Err(ExplorerError::NoViewer);
-        }
         let port = settings.port;
-        let fault = |source| ExplorerError::Port { port, source };
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(fault)?;
-        let port = listener.local_addr().map_err(fault)?.port();
-        let token = token()?;
-        let url = format!("http://{}:{port}/{token}/", Ipv4Addr::LOCALHOST);
+        let (page, port) =
+            web::listen(port).map_err(|source| ExplorerError::Port { port, source })?;
+        let (data, data_port) =
+            web::listen(0).map_err(|source| ExplorerError::Port { port: 0, source })?;
+        let guard = Arc::new(Guard::new(&[port, data_port]).map_err(ExplorerError::Random)?);
+        let (url, streams) = (guard.url(port), format!("{}stream/", guard.url(data_port)));
         let (sender, receiver) = bounded(WAITING);
-        let status = Arc::new(Status::new());
+        let status = Arc::new(Status::new(streams));
         let shared = status.clone();
+        let site = server::Site { commands: sender, status };
+        let routes = server::routes(guard, site).ok_or(ExplorerError::NoViewer)?;
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let session = thread("session")
             .spawn(move || {
@@ -114,9 +114,8 @@ impl Explorer {
                 session.serve();
             })
             .map_err(ExplorerError::Thread)?;
-        let site = server::Site { port, token, commands: sender, status };
         thread("server")
-            .spawn(move || server::serve(listener, site))
+            .spawn(move || server::serve(page, data, routes))
             .map_err(ExplorerError::Thread)?;
         Ok(Explorer { url, session })
     }
@@ -127,11 +126,4 @@ impl Explorer {
             std::panic::resume_unwind(panic);
         }
     }
-}
-
-/// A token of 128 random bits as hexadecimal digits.
-fn token() -> Result<String, ExplorerError> {
-    let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes).map_err(ExplorerError::Random)?;
-    Ok(bytes.iter().map(|b| format!("{b:02x}")).collect())
 }

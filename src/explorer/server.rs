@@ -1,37 +1,28 @@
-//! This module serves the page over HTTP, to this machine only.
-//!
-//! Every path starts with the token. The host of a request must be this machine, and its origin
-//! must not be another site. Pages choose scenes and files from lists of the session and never give
-//! paths. The sizes of bodies and headers and the number of connections are limited.
+//! This module serves the page of the explorer, behind the guard of [`crate::web`]. Pages choose
+//! scenes and files from lists of the session and never give paths.
 
 use super::protocol::{Answer, Command};
 use super::session::Request as Order;
 use super::status::Status;
-use crate::record::rerun_log::{ViewerFile, viewer_file};
+use crate::record::rerun_log::with_viewer;
+use crate::web::connections::{CLIENT_PATIENCE, accept};
+use crate::web::guard::{Guard, MAX_BODY};
+use crate::web::{file, kind};
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
-use axum::extract::{DefaultBodyLimit, Path, Request, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use crossbeam::channel::Sender;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
+use futures::future;
 use std::convert::Infallible;
 use std::net::TcpListener;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::oneshot;
 
-/// Maximum size of the body of a command (bytes).
-const MAX_BODY: usize = 16 * 1024;
-/// Maximum size of the header of a request (bytes).
-const MAX_HEAD: usize = 32 * 1024;
-/// Maximum number of concurrent connections.
-const MAX_CONNECTIONS: usize = 128;
-/// Time limit for the header of a request, and for its body.
-const CLIENT_PATIENCE: Duration = Duration::from_secs(10);
 /// Maximum silence of an event stream.
 const HEARTBEAT: Duration = Duration::from_secs(10);
 
@@ -43,18 +34,8 @@ const VIEWER: &str = include_str!("../../assets/explorer/viewer.html");
 const VIEWER_SCRIPT: &str = include_str!("../../assets/explorer/viewer.js");
 const ICON: &str = include_str!("../../assets/explorer/icon.svg");
 
-/// Content security policy: pages load only from this server, except the data of the recording.
-const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
-    style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; \
-    connect-src 'self' http://127.0.0.1:*; frame-src 'self'; worker-src 'self' blob:; \
-    frame-ancestors 'self'; base-uri 'none'; form-action 'none'";
-
 /// Configuration and data of the server.
 pub struct Site {
-    /// Port of the page.
-    pub port: u16,
-    /// Secret token in the address of the page.
-    pub token: String,
     /// Sender of commands to the session.
     pub commands: Sender<Order>,
     /// Data that the session publishes.
@@ -63,123 +44,41 @@ pub struct Site {
 
 type Shared = State<Arc<Site>>;
 
-/// Serves the page until the program ends.
-pub fn serve(listener: TcpListener, site: Site) {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    let outcome = runtime.and_then(|r| r.block_on(accept(listener, routes(Arc::new(site)))));
-    if let Err(e) = outcome {
-        eprintln!("error: the server of the page has stopped: {e}");
-    }
-}
-
-async fn accept(listener: TcpListener, routes: Router) -> std::io::Result<()> {
-    listener.set_nonblocking(true)?;
-    let listener = tokio::net::TcpListener::from_std(listener)?;
-    let places = Arc::new(Semaphore::new(MAX_CONNECTIONS));
-    loop {
-        let place = places.clone().acquire_owned().await;
-        let Ok((stream, _)) = listener.accept().await else {
-            // Too many open files, or an aborted connection: later connections may still succeed.
-            tokio::time::sleep(Duration::from_millis(50)).await;
-            continue;
-        };
-        let service = TowerToHyperService::new(routes.clone());
-        let serving = hyper::server::conn::http1::Builder::new()
-            .timer(TokioTimer::new())
-            .header_read_timeout(CLIENT_PATIENCE)
-            .max_buf_size(MAX_HEAD)
-            .serve_connection(TokioIo::new(stream), service);
-        tokio::spawn(async move {
-            // A broken connection concerns only its client.
-            let _ = serving.await;
-            drop(place);
-        });
-    }
-}
-
-fn routes(site: Arc<Site>) -> Router {
-    const HTML: &str = "text/html; charset=utf-8";
-    const JS: &str = "text/javascript; charset=utf-8";
-    let text = |kind: &'static str, text: &'static str| {
-        get(move || async move { ([(header::CONTENT_TYPE, kind)], text) })
-    };
-    let viewer = |kind: &'static str, file: ViewerFile| {
-        get(move || async move {
-            match viewer_file(file) {
-                Some(bytes) => {
-                    ([(header::CONTENT_TYPE, kind)], Bytes::from_static(bytes)).into_response()
-                }
-                None => StatusCode::NOT_FOUND.into_response(),
-            }
-        })
-    };
+/// The routes of the page; `None` if this program was built without the viewer's files.
+pub fn routes(guard: Arc<Guard>, site: Site) -> Option<Router> {
+    let page = || file(kind::HTML, PAGE.as_bytes());
+    let viewer = Router::new().route("/viewer.js", file(kind::SCRIPT, VIEWER_SCRIPT.as_bytes()));
     let inside = Router::new()
-        .route("/", text(HTML, PAGE))
-        .route("/style.css", text("text/css; charset=utf-8", STYLE))
-        .route("/explorer.js", text(JS, SCRIPT))
-        .route("/plots.js", text(JS, PLOTS))
-        .route("/icon.svg", text("image/svg+xml", ICON))
-        .route("/viewer/", text(HTML, VIEWER))
-        .route("/viewer/viewer.js", text(JS, VIEWER_SCRIPT))
-        .route("/viewer/re_viewer.js", viewer(JS, ViewerFile::Script))
-        .route("/viewer/re_viewer_bg.wasm", viewer("application/wasm", ViewerFile::Program))
+        .route("/", page())
+        .route("/style.css", file(kind::STYLE, STYLE.as_bytes()))
+        .route("/explorer.js", file(kind::SCRIPT, SCRIPT.as_bytes()))
+        .route("/plots.js", file(kind::SCRIPT, PLOTS.as_bytes()))
+        .route("/icon.svg", file(kind::SVG, ICON.as_bytes()))
+        .route("/viewer/", file(kind::HTML, VIEWER.as_bytes()))
+        .nest("/viewer", with_viewer(viewer)?)
+        .route("/stream/{name}", get(stream))
         .route("/api/state", get(state))
         .route("/api/events", get(events))
         .route("/api/curves", get(curves))
         .route("/api/sketch", get(sketch))
         .route("/api/command", post(command))
         .route("/api/saved/{folder}/{file}", get(saved));
-    // A nested router does not match its own root with a trailing slash.
-    let root = format!("/{}", site.token);
-    let mut all = Router::new().route(&format!("{root}/"), text(HTML, PAGE));
-    all = all.nest(&root, inside);
-    all.layer(DefaultBodyLimit::max(MAX_BODY))
-        .layer(from_fn_with_state(site.clone(), guard))
-        .with_state(site)
+    Some(guard.protect(page(), inside, Arc::new(site)))
 }
 
-/// Refuses requests that are not from a page of this program, and adds the security headers.
-async fn guard(State(site): Shared, request: Request, next: Next) -> Response {
-    let mut response = match admit(&site, &request) {
-        Ok(()) => next.run(request).await,
-        Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
-    };
-    let headers = response.headers_mut();
-    for (name, value) in [
-        (header::CONTENT_SECURITY_POLICY, POLICY),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-        (header::X_FRAME_OPTIONS, "SAMEORIGIN"),
-        (header::CACHE_CONTROL, "no-store"),
-        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
-    ] {
-        headers.insert(name, HeaderValue::from_static(value));
+/// Serves the page, and the streams of the viewer on a port of their own, until the program ends.
+/// A browser opens only a few connections to a port, and streams occupy theirs.
+pub fn serve(page: TcpListener, data: TcpListener, routes: Router) {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let outcome = runtime.and_then(|r| {
+        r.block_on(async {
+            let (page, data) = (pin!(accept(page, routes.clone())), pin!(accept(data, routes)));
+            future::select(page, data).await.factor_first().0
+        })
+    });
+    if let Err(e) = outcome {
+        eprintln!("error: the server of the page has stopped: {e}");
     }
-    response
-}
-
-fn admit(site: &Site, request: &Request) -> Result<(), &'static str> {
-    let headers = request.headers();
-    let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", site.port));
-    let text = |name: HeaderName| headers.get(name).map(|v| v.to_str().unwrap_or("?"));
-    if !text(header::HOST).is_some_and(|host| hosts.iter().any(|h| h == host)) {
-        return Err("the host name of this page must be that of this machine\n");
-    }
-    let ours = |origin: &str| hosts.iter().any(|h| origin.strip_prefix("http://") == Some(h));
-    if text(header::ORIGIN).is_some_and(|origin| !ours(origin)) {
-        return Err("requests from other sites are refused\n");
-    }
-    let given = request.uri().path().split('/').nth(1).unwrap_or_default();
-    if !same(given, &site.token) {
-        return Err("the address lacks the token that grainscope printed\n");
-    }
-    Ok(())
-}
-
-/// Compares in constant time, so that the duration does not reveal a partly correct token.
-fn same(a: &str, b: &str) -> bool {
-    let differ = a.bytes().zip(b.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
-    a.len() == b.len() && differ == 0
 }
 
 fn json(text: impl Into<Body>) -> Response {
@@ -217,6 +116,14 @@ async fn curves(State(site): Shared, uri: Uri) -> Response {
     match part.map(|p| serde_json::to_string(&p)) {
         Some(Ok(text)) => json(text),
         _ => (StatusCode::NOT_FOUND, "there is no such run\n").into_response(),
+    }
+}
+
+/// A recording for the viewer, while it is being made.
+async fn stream(State(site): Shared, Path(name): Path<String>) -> Response {
+    match site.status.stream(&name) {
+        Some(stream) => stream.response(),
+        None => (StatusCode::NOT_FOUND, "there is no such recording\n").into_response(),
     }
 }
 

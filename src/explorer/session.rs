@@ -37,6 +37,8 @@ const PUBLISH_EVERY: Duration = Duration::from_millis(100);
 const LOOK_UP: Duration = Duration::from_millis(200);
 /// Time for which a replaced recording is still served, until pages have switched.
 const FAREWELL: Duration = Duration::from_secs(5);
+/// Number of replaced recordings that are served at most; each has threads and memory of its own.
+const MOST_RETIRED: usize = 2;
 /// Exponent of the growth of the step time with the number of unknowns, between those of assembly
 /// and factorisation.
 const STEP_GROWTH: f64 = 1.3;
@@ -158,7 +160,7 @@ impl Session {
             self.dismiss();
         }
         if let Some(stage) = self.stage.take() {
-            stage.close();
+            stage.close(&self.status);
         }
     }
 
@@ -274,10 +276,11 @@ impl Session {
     fn set_stage(&mut self) {
         let number = self.number();
         let Some(live) = &self.live else { return };
-        match Stage::open(&self.pins, live, number) {
+        match Stage::open(&self.pins, live, number, &self.status) {
             Ok(stage) => {
                 if let Some(old) = self.stage.replace(stage) {
                     self.retired.push((Instant::now(), old));
+                    self.dismiss();
                 }
             }
             Err(e) => self.problem = Some(Problem::of_machine(e.to_string())),
@@ -287,9 +290,11 @@ impl Session {
     /// Closes retired recordings.
     fn dismiss(&mut self) {
         let due = |since: &Instant| since.elapsed() > FAREWELL;
-        while self.retired.first().is_some_and(|(since, _)| due(since)) {
+        while self.retired.len() > MOST_RETIRED
+            || self.retired.first().is_some_and(|(since, _)| due(since))
+        {
             // Nobody looks at it, so its errors do not matter.
-            let _ = self.retired.remove(0).1.close();
+            let _ = self.retired.remove(0).1.close(&self.status);
         }
     }
 

@@ -3,6 +3,7 @@
 use super::frame_buffer::FrameBuffer;
 use super::live::Live;
 use super::protocol::{PinState, Stream};
+use super::status::Status;
 use crate::frame::{Frame, RunInfo};
 use crate::record::logger::{Backpressure, Logger};
 use crate::record::rerun_log::{Lane, RecordError, RerunLog, Sink};
@@ -25,13 +26,20 @@ pub struct Pin {
 pub struct Stage {
     /// Address of the recording.
     pub stream: Stream,
+    /// Name of its stream.
+    name: String,
     logger: Logger,
 }
 
 impl Stage {
     /// Opens a recording of the run so far, beside the pinned runs; `number` makes its identifier
     /// unique.
-    pub fn open(pins: &[Pin], live: &Live, number: u64) -> Result<Stage, RecordError> {
+    pub fn open(
+        pins: &[Pin],
+        live: &Live,
+        number: u64,
+        status: &Status,
+    ) -> Result<Stage, RecordError> {
         let mut info = live.info.clone();
         info.recording_id = format!("{}-{number}", info.recording_id);
         if !pins.is_empty() {
@@ -41,10 +49,11 @@ impl Stage {
             pins.iter().map(|p| Lane { info: &p.info, frames: p.frames.frames() }).collect();
         let run = Lane { info: &info, frames: live.frames.frames() };
         let log = RerunLog::beside(&lanes, &run, &[Sink::Stream])?;
-        let url = log.url().unwrap_or_default().to_string();
-        let logger = Logger::start(log, Backpressure::DropOldest)
+        let name = format!("{number}.rrd");
+        let url = log.stream().map_or(String::new(), |stream| status.show(&name, stream));
+        let logger = Logger::start(log, Backpressure::DropOldest, Arc::default())
             .map_err(|e| RecordError::Viewer { name: "logger".into(), cause: e.to_string() })?;
-        Ok(Stage { stream: Stream { url, recording: info.recording_id }, logger })
+        Ok(Stage { stream: Stream { url, recording: info.recording_id }, name, logger })
     }
 
     /// Sends a frame; `false` if the recording has ended.
@@ -53,7 +62,8 @@ impl Stage {
     }
 
     /// Ends the recording; returns its error, if any.
-    pub fn close(self) -> Option<RecordError> {
+    pub fn close(self, status: &Status) -> Option<RecordError> {
+        status.hide(&self.name);
         self.logger.finish().0.err()
     }
 }

@@ -4,6 +4,7 @@
 use crate::frame::{Frame, RunInfo};
 use crate::plan::Plan;
 use crate::sim::row::{Place, Row, places};
+use crate::web::stream::Stream;
 use serde::Serialize;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -38,6 +39,9 @@ pub struct Status {
     curves: Mutex<HashMap<u64, Curves>>,
     files: Mutex<HashMap<(String, String), PathBuf>>,
     sketch: Mutex<Option<(RunInfo, Arc<Frame>)>>,
+    /// Address of the streams, to which their names are appended.
+    streams_at: String,
+    streams: Mutex<HashMap<String, Arc<Stream>>>,
 }
 
 /// Maximum number of particles in a sketch.
@@ -59,13 +63,15 @@ pub struct Sketch {
 }
 
 impl Status {
-    /// An empty status.
-    pub fn new() -> Status {
+    /// An empty status; `streams_at` is the address of the streams.
+    pub fn new(streams_at: String) -> Status {
         Status {
             state: watch::Sender::new("null".into()),
             curves: Mutex::default(),
             files: Mutex::default(),
             sketch: Mutex::default(),
+            streams_at,
+            streams: Mutex::default(),
         }
     }
 
@@ -138,6 +144,22 @@ impl Status {
             dye: snapshot.dye_lines.clone(),
             grains,
         })
+    }
+
+    /// Makes a stream available to the viewer, and returns its address.
+    pub fn show(&self, name: &str, stream: Arc<Stream>) -> String {
+        lock(&self.streams).insert(name.into(), stream);
+        format!("{}{name}", self.streams_at)
+    }
+
+    /// Removes a stream.
+    pub fn hide(&self, name: &str) {
+        lock(&self.streams).remove(name);
+    }
+
+    /// A stream that was made available.
+    pub fn stream(&self, name: &str) -> Option<Arc<Stream>> {
+        lock(&self.streams).get(name).cloned()
     }
 
     /// Makes a file available to pages, under a folder name and a file name.

@@ -2,14 +2,23 @@
 
 use super::rerun_log::{Finished, RecordError, RerunLog};
 use crate::frame::Frame;
-use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+use crossbeam::channel::{
+    Receiver, RecvTimeoutError, SendTimeoutError, Sender, TrySendError, bounded,
+};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Number of frames that may wait for the logger.
 const CAPACITY: usize = 8;
+
+/// Interval at which a waiting thread checks that the logger is still running.
+const LOOK_UP: Duration = Duration::from_millis(50);
+
+/// Time after an interrupt for which a logger that does not respond (a disk that hangs) is waited
+/// for.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Behaviour when the logger falls behind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +52,24 @@ pub struct Logger {
     thread: JoinHandle<Result<Finished, RecordError>>,
     busy_ns: Arc<AtomicU64>,
     traffic: Traffic,
+    patience: Patience,
+}
+
+/// Limit on the time of waiting after an interrupt.
+struct Patience {
+    interrupted: Arc<AtomicBool>,
+    /// When the interrupt was noticed.
+    since: Option<Instant>,
+}
+
+impl Patience {
+    /// Whether the time after an interrupt is over.
+    fn is_over(&mut self) -> bool {
+        if !self.interrupted.load(Ordering::SeqCst) {
+            return false;
+        }
+        self.since.get_or_insert_with(Instant::now).elapsed() > PATIENCE
+    }
 }
 
 /// Message to the logger thread.
@@ -69,8 +96,13 @@ impl Traffic {
 }
 
 impl Logger {
-    /// Starts the logger thread on an open recording.
-    pub fn start(log: RerunLog, policy: Backpressure) -> std::io::Result<Logger> {
+    /// Starts the logger thread on an open recording. While `interrupted` is set, a logger that does
+    /// not respond is given up after a few seconds.
+    pub fn start(
+        log: RerunLog,
+        policy: Backpressure,
+        interrupted: Arc<AtomicBool>,
+    ) -> std::io::Result<Logger> {
         let (sender, receiver) = bounded::<Item>(CAPACITY);
         let oldest = (policy == Backpressure::DropOldest).then(|| receiver.clone());
         let busy_ns = Arc::new(AtomicU64::new(0));
@@ -93,7 +125,26 @@ impl Logger {
             }
             log.finish()
         })?;
-        Ok(Logger { policy, sender, oldest, thread, busy_ns, traffic: Traffic::default() })
+        let patience = Patience { interrupted, since: None };
+        let traffic = Traffic::default();
+        Ok(Logger { policy, sender, oldest, thread, busy_ns, traffic, patience })
+    }
+
+    /// Puts a message into the channel, and waits as long as it is full.
+    fn pass(&mut self, mut item: Item) -> Result<(), LoggerGone> {
+        loop {
+            match self.sender.send_timeout(item, LOOK_UP) {
+                Ok(()) => return Ok(()),
+                Err(SendTimeoutError::Disconnected(_)) => return Err(LoggerGone),
+                Err(SendTimeoutError::Timeout(_)) if self.is_gone() => return Err(LoggerGone),
+                Err(SendTimeoutError::Timeout(back)) => item = back,
+            }
+        }
+    }
+
+    /// Whether waiting for the logger is useless.
+    fn is_gone(&mut self) -> bool {
+        self.thread.is_finished() || self.patience.is_over()
     }
 
     /// Sends a frame to the logger.
@@ -105,7 +156,7 @@ impl Logger {
             Err(TrySendError::Full(mut frame)) => match self.policy {
                 Backpressure::Wait => {
                     let clock = Instant::now();
-                    let sent = self.sender.send(frame).map_err(|_| LoggerGone);
+                    let sent = self.pass(frame);
                     self.traffic.waits += 1;
                     self.traffic.waited += clock.elapsed();
                     sent
@@ -140,19 +191,86 @@ impl Logger {
             return Ok(());
         }
         let (done, settled) = bounded(1);
-        self.sender.send(Item::Settle(done)).map_err(|_| LoggerGone)?;
-        settled.recv().map_err(|_| LoggerGone)
+        self.pass(Item::Settle(done))?;
+        loop {
+            match settled.recv_timeout(LOOK_UP) {
+                Ok(()) => return Ok(()),
+                Err(RecvTimeoutError::Disconnected) => return Err(LoggerGone),
+                // The message may have entered the channel when the logger had just ended: then
+                // nobody drops it.
+                Err(RecvTimeoutError::Timeout) if self.is_gone() => return Err(LoggerGone),
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+        }
     }
 
     /// Waits until everything is recorded. Returns the result, the counts and the busy time.
     pub fn finish(self) -> (Result<Finished, RecordError>, Traffic, Duration) {
-        let Logger { sender, oldest, thread, busy_ns, traffic, .. } = self;
+        let Logger { sender, oldest, thread, busy_ns, traffic, mut patience, .. } = self;
         drop(sender);
         drop(oldest);
+        let busy = || Duration::from_nanos(busy_ns.load(Ordering::Relaxed));
+        while !thread.is_finished() {
+            if patience.is_over() {
+                return (Err(RecordError::Stuck), traffic, busy());
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
         let result = match thread.join() {
             Ok(result) => result,
             Err(panic) => std::panic::resume_unwind(panic),
         };
-        (result, traffic, Duration::from_nanos(busy_ns.load(Ordering::Relaxed)))
+        (result, traffic, busy())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A logger whose thread runs `work` instead of writing a recording.
+    fn logger(
+        interrupted: &Arc<AtomicBool>,
+        work: impl FnOnce(Receiver<Item>) + Send + 'static,
+    ) -> Logger {
+        let (sender, receiver) = bounded::<Item>(CAPACITY);
+        let thread = std::thread::spawn(move || {
+            work(receiver);
+            Err(RecordError::Stuck)
+        });
+        Logger {
+            policy: Backpressure::Wait,
+            sender,
+            oldest: None,
+            thread,
+            busy_ns: Arc::default(),
+            traffic: Traffic::default(),
+            patience: Patience { interrupted: interrupted.clone(), since: None },
+        }
+    }
+
+    #[test]
+    fn a_logger_that_died_is_not_waited_for() {
+        // The message to settle is still in the channel, and its receiver is never dropped.
+        let clock = Instant::now();
+        let mut dead = logger(&Arc::default(), std::mem::forget);
+        assert!(dead.settle().is_err());
+        assert!(dead.finish().0.is_err());
+        // The channel is full.
+        let mut dead = logger(&Arc::default(), std::mem::forget);
+        let sent = (0..=CAPACITY).try_for_each(|_| dead.send(Frame::default()));
+        assert!(sent.is_err());
+        assert!(clock.elapsed() < Duration::from_secs(5));
+    }
+
+    #[test]
+    fn after_an_interrupt_a_logger_that_hangs_is_given_up() {
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let mut stuck = logger(&interrupted, |_channel| std::thread::sleep(Duration::MAX));
+        interrupted.store(true, Ordering::SeqCst);
+        let clock = Instant::now();
+        assert!(stuck.settle().is_err());
+        assert!(stuck.finish().0.is_err());
+        assert!(clock.elapsed() < 2 * PATIENCE);
     }
 }

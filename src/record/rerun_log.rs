@@ -30,6 +30,7 @@ mod viewer;
 
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rerun::archetypes;
@@ -43,10 +44,11 @@ pub use repair::repair;
 pub use side_by_side::{Difference, RecordedRun, SideBySide};
 pub use sinks::{Saved, Sink};
 pub use stage::Lane;
-pub use viewer::{ViewerFile, viewer_file};
+pub use viewer::with_viewer;
 
 use crate::frame::{Frame, Quantity, Rect, RunInfo};
 use crate::record::colour::ColourScale;
+use crate::web::stream::Stream;
 use sinks::{Destinations, Live, Page, RrdFile};
 
 /// Application identifier of all recordings.
@@ -108,6 +110,9 @@ pub enum RecordError {
         /// Cause, as reported by the operating system or the encoder.
         cause: String,
     },
+    /// The disk or a viewer did not respond when the run was interrupted.
+    #[error("the recording is incomplete: the disk or the viewer does not respond")]
+    Stuck,
     /// A viewer cannot be reached, and there is no other destination.
     #[error("the viewer at {name} does not answer: {cause}")]
     Viewer {
@@ -183,6 +188,7 @@ pub struct RerunLog {
     files: Vec<RrdFile>,
     viewers: Vec<Live>,
     page: Option<Page>,
+    stream: Option<Arc<Stream>>,
     notices: Vec<String>,
     checked: Instant,
     /// Class numbers as last recorded; they are recorded again only when they change.
@@ -237,6 +243,7 @@ impl RerunLog {
         log.files = to.files;
         log.viewers = to.viewers;
         log.page = to.page;
+        log.stream = to.stream;
         log.constant(info)?;
         // A viewer that is absent from the start is an error of the command line. `check` would
         // drop it.
@@ -269,6 +276,7 @@ impl RerunLog {
             files: Vec::new(),
             viewers: Vec::new(),
             page: None,
+            stream: None,
             notices: Vec::new(),
             checked: Instant::now(),
             classes: Vec::new(),
@@ -279,7 +287,12 @@ impl RerunLog {
         }
     }
 
-    /// Address to open in a browser, or in a viewer if only the data is streamed.
+    /// The stream of the recording; `None` if it is neither streamed nor served.
+    pub fn stream(&self) -> Option<Arc<Stream>> {
+        self.stream.clone()
+    }
+
+    /// Address of the page, to be opened in a browser.
     pub fn url(&self) -> Option<&str> {
         self.page.as_ref().map(|page| page.url.as_str())
     }

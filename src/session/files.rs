@@ -92,6 +92,7 @@ impl Session {
             run.as_ref(),
             (&folder, recording.as_deref()),
             drive::warnings(plan),
+            &interrupted,
         )?;
         let scene_file = folder.join("scene.toml");
         std::fs::write(&scene_file, to_toml(&plan.scene)).map_err(|e| cannot(&scene_file, e))?;
@@ -144,6 +145,7 @@ impl Session {
             run.as_ref(),
             (&folder, past.recording.as_deref()),
             past.warnings,
+            &interrupted,
         )?;
         let safety = options.safety.or(past.safety);
         let tally = Tally { warnings, ..past.tally };
@@ -335,6 +337,7 @@ fn start_logger(
     run: &dyn Run,
     (folder, recording): (&Path, Option<&Path>),
     mut warnings: Vec<String>,
+    interrupted: &Interrupted,
 ) -> Result<(Option<Logger>, Vec<String>), SessionError> {
     let mut sinks: Vec<Sink> = recording.map(|p| Sink::Save(p.to_path_buf())).into_iter().collect();
     sinks.extend(options.viewers.iter().cloned());
@@ -366,7 +369,7 @@ fn start_logger(
         tell(format_args!("viewer: {url}"));
     }
     let policy = if recording.is_some() { Backpressure::Wait } else { Backpressure::DropOldest };
-    let mut logger = Logger::start(log, policy).map_err(|e| {
+    let mut logger = Logger::start(log, policy, interrupted.clone()).map_err(|e| {
         SessionError::Environment(format!("the logger thread cannot be started: {e}"))
     })?;
     if step > 0 && last_step != Some(step) {

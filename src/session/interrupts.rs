@@ -8,12 +8,28 @@ use std::time::Duration;
 /// A flag that an interrupt sets; a run then ends after its current step.
 pub type Interrupted = Arc<AtomicBool>;
 
+/// Time after an interrupt at which the program ends, whatever it does.
+const PATIENCE: Duration = Duration::from_millis(9_000);
+
 /// Handles interrupts: the first sets the flag, a second ends the program with the given exit code.
+/// After [`PATIENCE`] the program ends by itself: schedulers kill soon after that.
 pub fn watch_interrupts(exit_code: u8) -> Interrupted {
     let interrupted = Interrupted::default();
     let flag = interrupted.clone();
     let watching = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::SeqCst) {
+            std::process::exit(i32::from(exit_code));
+        }
+        let late = move || {
+            std::thread::sleep(PATIENCE);
+            tell(format_args!(
+                "warning: the present step did not end within {} s of the interrupt; the last \
+                 checkpoint remains, and `grainscope resume` continues from it",
+                PATIENCE.as_secs()
+            ));
+            std::process::exit(i32::from(exit_code));
+        };
+        if std::thread::Builder::new().name("interrupt".into()).spawn(late).is_err() {
             std::process::exit(i32::from(exit_code));
         }
     });

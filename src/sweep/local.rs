@@ -12,7 +12,7 @@ const POLL: Duration = Duration::from_millis(50);
 /// Interval at which the progress is read from the folders.
 const REPORT: Duration = Duration::from_millis(500);
 /// Time that interrupted processes have to finish their step.
-const PATIENCE: Duration = Duration::from_secs(30);
+const PATIENCE: Duration = Duration::from_secs(7);
 /// Fraction of the free memory that cases may use.
 const MEMORY_SHARE: f64 = 0.8;
 /// Number of words kept from the error output of a failed process.

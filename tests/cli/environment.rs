@@ -160,28 +160,44 @@ fn closed_output_pipes_are_not_an_error() {
     assert_eq!(child.wait().expect("an end").code(), Some(3));
 }
 
-/// A server of the viewer: the page of a finished run.
+/// A process that receives recordings as a viewer does.
 struct Viewer {
     program: Child,
     port: u16,
 }
 
+/// Environment variable with the port of a viewer.
+const VIEWER_PORT: &str = "GRAINSCOPE_TEST_VIEWER";
+
+/// Not a test of its own: the process of a [`Viewer`] runs it.
+#[test]
+#[ignore = "it serves as a viewer for other tests"]
+fn viewer_process() {
+    let Some(port) = std::env::var(VIEWER_PORT).ok().and_then(|p| p.parse().ok()) else { return };
+    let options = rerun::external::re_grpc_server::ServerOptions::default();
+    let server = rerun::grpc_server::GrpcServerSink::new("127.0.0.1", port, options);
+    std::thread::sleep(PATIENCE);
+    drop(server);
+}
+
 impl Viewer {
-    fn start(here: &TempFolder) -> Viewer {
-        let mut program = here
-            .command(&["run", "couette_cosserat", "--steps", "0", "--no-recording", "--serve"])
+    fn start() -> Viewer {
+        let free = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let port = free.local_addr().expect("an address").port();
+        drop(free);
+        let program = Command::new(std::env::current_exe().expect("this program"))
+            .args(["--exact", "environment::viewer_process", "--ignored"])
+            .env(VIEWER_PORT, port.to_string())
             .stdout(Stdio::null())
-            .stderr(Stdio::piped())
+            .stderr(Stdio::null())
             .spawn()
             .expect("the program starts");
-        let mut said = String::new();
-        let mut out = std::io::BufReader::new(program.stderr.take().expect("piped"));
-        while !said.contains("proxy") {
-            let read = std::io::BufRead::read_line(&mut out, &mut said).expect("a line");
-            assert!(read > 0, "{said}");
+        let clock = Instant::now();
+        while TcpStream::connect(("127.0.0.1", port)).is_err() {
+            assert!(clock.elapsed() < PATIENCE);
+            std::thread::sleep(Duration::from_millis(20));
         }
-        let port = said.split("%3A").last().and_then(|s| s.split("%2F").next()).expect("a port");
-        Viewer { program, port: port.parse().expect("a number") }
+        Viewer { program, port }
     }
 
     fn kill(&mut self) {
@@ -242,7 +258,7 @@ fn recorded_whole(here: &TempFolder, run: &str) {
 #[test]
 fn a_viewer_that_dies_or_sticks_does_not_take_the_run_with_it() {
     let here = TempFolder::new();
-    let mut viewer = Viewer::start(&here);
+    let mut viewer = Viewer::start();
     let hash = |run: &str| here.json(&format!("{run}/summary.json"))["state_hash"].clone();
     here.grainscope(&arguments("whole", &["--no-recording"])).exits(0);
     // The viewer stops reading after some pictures.
@@ -268,7 +284,7 @@ fn a_viewer_that_dies_or_sticks_does_not_take_the_run_with_it() {
 #[test]
 fn a_slow_viewer_loses_only_what_may_be_lost() {
     let here = TempFolder::new();
-    let viewer = Viewer::start(&here);
+    let viewer = Viewer::start();
     // Many small pictures, made faster than they can be shown.
     let scene = ["run", "couette_cosserat", "--set", "accuracy.cells=8"];
     let pace = ["--set", "time.max_step=2e-4", "--set", "recording.frames=100000"];

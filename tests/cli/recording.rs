@@ -7,6 +7,8 @@ use rerun::external::re_chunk_store::{ChunkStore, ChunkStoreConfig};
 use rerun::external::re_log_types::{StoreKind, TimelineName};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
+use std::io::{Read, Write};
+use std::time::Duration;
 
 fn stores(path: &Path) -> Vec<ChunkStore> {
     let mut file = File::open(path).expect("the recording");
@@ -215,28 +217,49 @@ fn an_invalid_address_is_an_error_with_an_example() {
 fn a_busy_port_is_an_error_that_names_it() {
     let busy = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = busy.local_addr().expect("an address").port();
-    for sink in
-        [Sink::Serve { web_port: 0, grpc_port: port }, Sink::Serve { web_port: port, grpc_port: 0 }]
-    {
-        let error = refusal(sink);
-        assert!(error.contains(&port.to_string()) && error.contains("any free port"), "{error}");
-    }
+    let error = refusal(Sink::Serve { port });
+    assert!(error.contains(&port.to_string()) && error.contains("any free port"), "{error}");
 }
 
 #[test]
 fn a_recording_is_served_and_saved_at_once() {
     let here = TempFolder::new();
     let path = here.path("x.rrd");
-    let sinks = [Sink::Save(path.clone()), Sink::Serve { web_port: 0, grpc_port: 0 }];
+    let sinks = [Sink::Save(path.clone()), Sink::Serve { port: 0 }];
     let mut log = RerunLog::open(&info(), &sinks).expect("a recording");
     (0..20).for_each(|step| log.frame(&frame(step)).expect("a frame"));
     let finished = log.finish().expect("an end");
     assert!(finished.notices.is_empty(), "{:?}", finished.notices);
     let served = finished.served.expect("a page");
     let address = served.url().trim_start_matches("http://");
-    let (address, query) = address.split_once('/').expect("a path");
-    assert!(query.starts_with("?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A"), "{query}");
-    std::net::TcpStream::connect(address).expect("the page answers");
+    let (host, token) = address.split_once('/').expect("a path");
+    let token = token.trim_end_matches('/');
+    let get = |path: &str, headers: &str| -> Vec<u8> {
+        let mut stream = std::net::TcpStream::connect(host).expect("the page answers");
+        stream.set_read_timeout(Some(Duration::from_secs(2))).expect("a timeout");
+        write!(stream, "GET {path} HTTP/1.1\r\n{headers}\r\n").expect("sent");
+        let (mut bytes, mut part) = (vec![], [0; 1 << 16]);
+        // The stream stays open as long as the recording is served.
+        while let Ok(n @ 1..) = stream.read(&mut part) {
+            bytes.extend(&part[..n]);
+        }
+        bytes
+    };
+    let ours = format!("Host: {host}\r\n");
+    let starts = |path: &str, headers: &str, with: &str| {
+        let said = get(path, headers);
+        let text = String::from_utf8_lossy(&said[..said.len().min(400)]).into_owned();
+        assert!(text.starts_with(with), "{path} {headers}: {text}");
+    };
+    starts(&format!("/{token}/"), &ours, "HTTP/1.1 200");
+    let data = format!("/{token}/recording.rrd");
+    starts(&data, "Host: evil.example\r\n", "HTTP/1.1 403");
+    starts(&data, &format!("{ours}Origin: http://localhost:1\r\n"), "HTTP/1.1 403");
+    starts("/recording.rrd", &ours, "HTTP/1.1 403");
+    starts("/", &ours, "HTTP/1.1 403");
+    let streamed = get(&data, &ours);
+    assert!(streamed.windows(4).any(|w| w == b"RRF2"), "no recording");
+    assert!(streamed.len() > 10_000, "only {} bytes", streamed.len());
     // The file is complete while the recording is still served.
     assert_eq!(steps(&recording(&path)).len(), 20);
 }

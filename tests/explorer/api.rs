@@ -385,3 +385,86 @@ fn a_taken_port_and_an_unknown_scene_are_refused() {
     assert_eq!(said.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&said.stderr).contains("did you mean `silo`"));
 }
+
+/// Strangers that hold connections open do not keep the page from its user.
+#[test]
+fn silent_strangers_do_not_block_the_page() {
+    let explorer = Explorer::open(&SMALL);
+    let (port, page) = (explorer.port(), explorer.below(""));
+    let silent: Vec<TcpStream> =
+        (0..400).map(|_| TcpStream::connect(("127.0.0.1", port)).expect("a connection")).collect();
+    for _ in 0..3 {
+        let clock = Instant::now();
+        assert_eq!(request(port, "GET", &page, &[], b"").code, 200);
+        assert!(clock.elapsed() < Duration::from_secs(1), "{:?}", clock.elapsed());
+    }
+    drop(silent);
+}
+
+/// The data of the recording are private.
+#[test]
+fn the_stream_of_the_viewer_is_guarded() {
+    let explorer = Explorer::open(&SMALL);
+    let stream = explorer.wait_for("a stream", |s| !s["stream"].is_null())["stream"]["url"].clone();
+    let url = stream.as_str().expect("text").trim_start_matches("http://127.0.0.1:");
+    let (port, path) = url.split_once('/').expect("a path");
+    let (port, path): (u16, _) = (port.parse().expect("a port"), format!("/{path}"));
+    let refused = |path: &str, headers: &[(&str, &str)]| {
+        assert_eq!(request(port, "GET", path, headers, b"").code, 403, "{path} {headers:?}");
+    };
+    refused(&path, &[("Host", "evil.example")]);
+    refused(&path, &[("Origin", "http://localhost:1")]);
+    refused("/stream/1.rrd", &[]);
+    assert_eq!(request(port, "POST", &path, &[], b"x").code, 405);
+    // The page of the other port may read it.
+    let origin = format!("http://127.0.0.1:{}", explorer.port());
+    let mut client = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
+    client.set_read_timeout(Some(Duration::from_secs(60))).expect("a timeout");
+    write!(client, "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nOrigin: {origin}\r\n\r\n")
+        .expect("sent");
+    let (mut bytes, mut part) = (vec![], [0; 1 << 14]);
+    while !bytes.windows(4).any(|w| w == b"RRF2") {
+        let n = client.read(&mut part).expect("data");
+        assert!(n > 0, "the stream ended");
+        bytes.extend(&part[..n]);
+    }
+    let head = String::from_utf8_lossy(&bytes).to_ascii_lowercase();
+    assert!(head.contains(&format!("access-control-allow-origin: {origin}")), "{head}");
+}
+
+/// Numbers of threads and of kilobytes of a process.
+#[cfg(target_os = "linux")]
+fn size_of(process: u32) -> (u64, u64) {
+    let text = std::fs::read_to_string(format!("/proc/{process}/status")).expect("a status");
+    let number = |key: &str| -> u64 {
+        let line = text.lines().find(|l| l.starts_with(key)).expect("a line");
+        line.split_whitespace().nth(1).and_then(|n| n.parse().ok()).expect("a number")
+    };
+    (number("Threads:"), number("VmRSS:"))
+}
+
+/// Restarts, pins and loaded scenes leave no threads and no memory behind.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_was_replaced_is_freed() {
+    let tiny = ["couette_cosserat", "--paused", "--set", "accuracy.cells=4"];
+    let explorer = Explorer::open(&tiny);
+    let round = |times: usize| {
+        for _ in 0..times {
+            explorer.tell(json!({ "do": "restart" }));
+            explorer.tell(json!({ "do": "pin", "name": "kept" }));
+            let pins = explorer.state()["pins"].clone();
+            let name = pins[0]["name"].as_str().expect("a pin").to_string();
+            explorer.tell(json!({ "do": "unpin", "name": name }));
+        }
+        // Replaced recordings are served for some seconds.
+        std::thread::sleep(Duration::from_secs(6));
+        explorer.tell(json!({ "do": "restart" }));
+        std::thread::sleep(Duration::from_secs(1));
+        size_of(explorer.child.id())
+    };
+    let (threads, memory) = round(50);
+    let (threads_later, memory_later) = round(200);
+    assert!(threads_later <= threads + 8, "{threads} threads, then {threads_later}");
+    assert!(memory_later < memory + 40_000, "{memory} kB, then {memory_later} kB");
+}

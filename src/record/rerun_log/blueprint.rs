@@ -118,6 +118,8 @@ fn lay_out(
         return Ok(());
     };
     rec.send_blueprint(storage.take(), BlueprintActivationCommand::make_active(id));
+    // The storage holds the stream, which holds the storage: without this, neither would be freed.
+    layout.disconnect();
     Ok(())
 }
 

@@ -4,35 +4,29 @@
 //! error. An error of a viewer is an error of the recording only if no other destination is left.
 
 mod live;
+mod page;
 
 use live::LiveSink;
+pub(super) use page::Page;
+use page::StreamSink;
 use std::fs::File;
-use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use rerun::external::re_build_info::CrateVersion;
 use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
-use rerun::external::{re_grpc_server, re_uri};
+use rerun::external::re_uri;
 use rerun::log::LogMsg;
 use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
 
 use rerun::RecordingStream;
 
 use super::{APPLICATION, FILE_TICK, RecordError};
+use crate::web::stream::Stream;
 
 /// Time after which a viewer that accepts no data is given up.
 const VIEWER_PATIENCE: Duration = Duration::from_secs(5);
-
-/// Size of the history that a server keeps for viewers that connect late (bytes).
-///
-/// It is half of the memory of a 1 GiB process: the viewer, often on the same machine, holds the
-/// same frames once more.
-const SERVER_HISTORY_BYTES: u64 = 512 * 1024 * 1024;
-
-/// Address to serve on: only this machine can connect.
-const HOST: Ipv4Addr = Ipv4Addr::LOCALHOST;
 
 /// A destination of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,11 +38,9 @@ pub enum Sink {
     /// A page served by this process, to this machine only.
     Serve {
         /// Port of the page; 0 takes any free port.
-        web_port: u16,
-        /// Port of the data; 0 takes any free port.
-        grpc_port: u16,
+        port: u16,
     },
-    /// The data alone, served to viewers on this machine that know its address.
+    /// A stream of bytes, which another part of the program serves.
     Stream,
     /// The `rerun` viewer found on `PATH`, started now.
     Spawn,
@@ -183,14 +175,6 @@ impl Live {
     }
 }
 
-/// A page that shows the recording in a browser; it is served until this value is dropped.
-pub(super) struct Page {
-    /// Address of the page, or of the data alone.
-    pub(super) url: String,
-    /// Server of the page, which stops when dropped; `None` if only the data is served.
-    _server: Option<Box<dyn std::any::Any + Send>>,
-}
-
 /// All destinations of one recording.
 #[derive(Default)]
 pub(super) struct Destinations {
@@ -202,6 +186,8 @@ pub(super) struct Destinations {
     pub(super) viewers: Vec<Live>,
     /// The served page, if any.
     pub(super) page: Option<Page>,
+    /// The stream of bytes, if any.
+    pub(super) stream: Option<Arc<Stream>>,
 }
 
 impl Destinations {
@@ -211,7 +197,7 @@ impl Destinations {
             .recording_id(id)
             // The RERUN environment variable must not disable a requested recording.
             .enabled(true);
-        if self.viewers.is_empty() {
+        if self.viewers.is_empty() && self.stream.is_none() {
             builder = builder.batcher_config(rerun::log::ChunkBatcherConfig {
                 flush_tick: FILE_TICK,
                 ..Default::default()
@@ -228,15 +214,22 @@ impl Destinations {
         let mut all = Self::default();
         for sink in sinks {
             match sink {
-                Sink::Save(path) => {
-                    let file = RrdFile::create(path)?;
-                    all.files.push(file.clone());
-                    all.sinks.push(Box::new(file));
-                }
+                // Files are created last: if anything else fails, none is touched.
+                Sink::Save(_) => {}
                 Sink::Connect(url) => all.connect(url)?,
-                Sink::Serve { web_port, grpc_port } => all.serve(*web_port, *grpc_port)?,
-                Sink::Stream => all.stream()?,
+                Sink::Serve { port } => {
+                    let stream = all.stream()?;
+                    all.page = Some(Page::open(*port, stream)?);
+                }
+                Sink::Stream => all.stream().map(drop)?,
                 Sink::Spawn => all.spawn()?,
+            }
+        }
+        for sink in sinks {
+            if let Sink::Save(path) = sink {
+                let file = RrdFile::create(path)?;
+                all.files.push(file.clone());
+                all.sinks.push(Box::new(file));
             }
         }
         Ok(all)
@@ -264,6 +257,8 @@ impl Destinations {
         let options = rerun::SpawnOptions {
             hide_welcome_screen: true,
             wait_for_bind: true,
+            // With this variable the viewer sends no usage statistics to its makers.
+            extra_env: vec![("CI".into(), "true".into())],
             ..Default::default()
         };
         let viewer = rerun::spawn(&options)
@@ -271,60 +266,11 @@ impl Destinations {
         self.connect(&format!("rerun+http://127.0.0.1:{}/proxy", viewer.port))
     }
 
-    fn serve(&mut self, web_port: u16, grpc_port: u16) -> Result<(), RecordError> {
-        let [grpc_port, web_port] = claim([grpc_port, web_port])?;
-        let page = rerun::serve_web_viewer(rerun::web_viewer::WebViewerConfig {
-            bind_ip: HOST.to_string(),
-            web_port: web_port.into(),
-            open_browser: false,
-            ..Default::default()
-        })
-        .map_err(|e| RecordError::Viewer {
-            name: format!("port {web_port}"),
-            cause: e.to_string(),
-        })?;
-        self.data(grpc_port, format!("page on port {web_port}"))?;
-        self.page = Some(Page {
-            url: format!(
-                "http://{HOST}:{web_port}/?url=rerun%2Bhttp%3A%2F%2F{HOST}%3A{grpc_port}%2Fproxy"
-            ),
-            _server: Some(Box::new(page)),
-        });
-        Ok(())
+    /// Opens a stream, which viewers can read from its start at any time.
+    fn stream(&mut self) -> Result<Arc<Stream>, RecordError> {
+        let (sink, stream) = StreamSink::new()?;
+        self.sinks.push(Box::new(sink));
+        self.stream = Some(stream.clone());
+        Ok(stream)
     }
-
-    fn stream(&mut self) -> Result<(), RecordError> {
-        let [port, _] = claim([0, 0])?;
-        self.data(port, format!("data on port {port}"))?;
-        self.page = Some(Page { url: format!("rerun+http://{HOST}:{port}/proxy"), _server: None });
-        Ok(())
-    }
-
-    /// Serves the data. Viewers that connect late receive the history.
-    fn data(&mut self, port: u16, name: String) -> Result<(), RecordError> {
-        let sink = rerun::grpc_server::GrpcServerSink::new(
-            &HOST.to_string(),
-            port,
-            re_grpc_server::ServerOptions {
-                memory_limit: rerun::MemoryLimit::from_bytes(SERVER_HISTORY_BYTES),
-                ..Default::default()
-            },
-        )
-        .map_err(|e| RecordError::Viewer { name: format!("port {port}"), cause: e.to_string() })?;
-        self.add_viewer(name, Box::new(sink))
-    }
-}
-
-/// Checks that ports of this machine are free, and chooses free ones for 0.
-///
-/// Rerun's server thread does not report a port that is in use.
-fn claim(ports: [u16; 2]) -> Result<[u16; 2], RecordError> {
-    let bind = |port| {
-        TcpListener::bind((HOST, port))
-            .and_then(|listener| Ok((listener.local_addr()?.port(), listener)))
-            .map_err(|source| RecordError::Port { port, source })
-    };
-    // Both listeners are held until both ports are known, so that they differ.
-    let (first, second) = (bind(ports[0])?, bind(ports[1])?);
-    Ok([first.0, second.0])
 }

@@ -2,23 +2,19 @@
 
 use std::sync::OnceLock;
 
+use axum::Router;
 use re_web_viewer_server::WebViewerData;
 
-/// A file of the browser viewer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ViewerFile {
-    /// JavaScript that loads the program and communicates with it.
-    Script,
-    /// The program, in WebAssembly.
-    Program,
-}
+use crate::web::{file, kind};
 
-/// Content of a file of the viewer; `None` if this build does not contain the viewer.
-pub fn viewer_file(file: ViewerFile) -> Option<&'static [u8]> {
+/// Adds the files of the Rerun viewer, `re_viewer.js` and `re_viewer_bg.wasm`, to the routes of a
+/// page; `None` if this build lacks them.
+pub fn with_viewer<S: Clone + Send + Sync + 'static>(routes: Router<S>) -> Option<Router<S>> {
     static FILES: OnceLock<Option<WebViewerData>> = OnceLock::new();
     let files = FILES.get_or_init(|| WebViewerData::load(None).ok()).as_ref()?;
-    Some(match file {
-        ViewerFile::Script => files.viewer_js(),
-        ViewerFile::Program => files.viewer_wasm(),
-    })
+    Some(
+        routes
+            .route("/re_viewer.js", file(kind::SCRIPT, files.viewer_js()))
+            .route("/re_viewer_bg.wasm", file(kind::WASM, files.viewer_wasm())),
+    )
 }
