@@ -2,6 +2,7 @@
 
 use super::{Failure, print};
 use crate::compare::{self, Comparison, Tolerance};
+use crate::record::replace::{Aside, Kind, beside, may_replace};
 use crate::record::rerun_log::{Served, Sink};
 use crate::results::{self, Member, ResultsError};
 use crate::session::{wait_for_interrupt, watch_interrupts};
@@ -98,7 +99,14 @@ pub(super) fn write(
             Failure::Environment(format!("cannot make the folder {}: {e}", folder.display()))
         })?;
     }
+    // The earlier recording is kept until the new one is complete.
+    let mut aside = Aside::default();
+    may_replace(path, Kind::Recording)?;
+    if recorded && path.is_file() {
+        aside.take(path, &beside(path, ".replaced"))?;
+    }
     let (mut comparison, finished) = compare::record(found, members, sinks)?;
+    aside.discard();
     let mut files = vec![];
     let mut served = None;
     if let Some(finished) = finished {

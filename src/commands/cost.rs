@@ -6,6 +6,7 @@ use crate::cost::{self, CostError, Effort, List, Machine, list, report};
 use crate::frame::{Plot, Scalar, Series};
 use crate::record::info;
 use crate::record::plots::{Axis, Curve, PlotSpec, line_plot};
+use crate::record::replace::{self, Kind, MARK};
 use crate::record::rerun_log::{Race, RecordError};
 use crate::scene::{SceneSource, parse, scene_hash};
 use std::path::{Path, PathBuf};
@@ -171,13 +172,13 @@ fn write(folder: &Path, list: &List) -> Result<(), Failure> {
         Failure::Environment(format!("cannot write {}: {e}", path.display()))
     };
     std::fs::create_dir_all(folder).map_err(|e| cannot(folder, e))?;
-    for (name, text) in [
-        ("cost.csv", list.csv()),
-        ("cost.json", json(list)? + "\n"),
-        ("cost.md", report::markdown(list)),
+    let page = format!("{MARK} cost`; do not edit.\n\n{}", report::markdown(list));
+    for (name, text, kind) in [
+        ("cost.csv", list.csv(), Kind::Table("front,settings")),
+        ("cost.json", json(list)? + "\n", Kind::Json("schema")),
+        ("cost.md", page, Kind::Page),
     ] {
-        let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|e| cannot(&path, e))?;
+        replace::write(&folder.join(name), text, kind)?;
     }
     line_plot(&folder.join("cost"), &plot(list))?;
     Ok(())

@@ -4,6 +4,7 @@
 use super::Failure;
 use crate::cost::knobs::KNOBS;
 use crate::cost::{List, report};
+use crate::record::replace::{self, Kind};
 use crate::scene::presets;
 use std::path::Path;
 
@@ -63,5 +64,5 @@ pub fn write(folder: &Path, list: &List) -> Result<(), Failure> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
         Err(e) => return Err(cannot(e)),
     };
-    std::fs::write(&path, page(&old, list)).map_err(cannot)
+    Ok(replace::write(&path, page(&old, list), Kind::Page)?)
 }

@@ -5,12 +5,13 @@ use crate::compare;
 use crate::frame::Snapshot;
 use crate::plan::Plan;
 use crate::record::figure_page::{Row, Sheet, sheet};
+use crate::record::folder::{self, FolderError, RunFolder};
+use crate::record::info;
 use crate::record::number::short;
 use crate::record::rerun_log::Sink;
 use crate::record::text::duration;
-use crate::record::{folder, info};
 use crate::scene::presets;
-use crate::session::{Interrupted, Options, Session, SessionError, progress_bar, watch_interrupts};
+use crate::session::{Interrupted, Options, Session, progress_bar, watch_interrupts};
 use crate::sim::Run;
 use crate::sweep;
 use indicatif::ProgressBar;
@@ -112,7 +113,10 @@ impl Name {
 struct Job {
     name: String,
     plan: Arc<Plan>,
+    /// Path of the folder.
     folder: PathBuf,
+    /// The folder, until the run takes it.
+    claimed: Mutex<Option<RunFolder>>,
 }
 
 /// Runs the command.
@@ -157,8 +161,9 @@ fn jobs(figure: &Figure, args: &Args, out: &Path) -> Result<Vec<Job>, Failure> {
     for (name, folder, sets) in cases(figure, args.quick)? {
         let own = figure.sets.iter().chain(quick).map(|s| s.to_string());
         let (_, plan) = super::resolve(&source.with_sets(&own.chain(sets).collect::<Vec<_>>())?)?;
-        let folder = folder::create(&folder, Some(&out.join(&folder)), args.force)?;
-        jobs.push(Job { name, plan: Arc::new(plan), folder });
+        let claimed = folder::create(&folder, Some(&out.join(&folder)), args.force, None)?;
+        let folder = claimed.path().to_owned();
+        jobs.push(Job { name, plan: Arc::new(plan), folder, claimed: Mutex::new(Some(claimed)) });
     }
     Ok(jobs)
 }
@@ -235,19 +240,22 @@ fn make(
     let mut pictures = vec![];
     let mut counted = 0;
     let options = Options { quiet: true, ..Options::default() };
-    let folder = || Ok::<_, SessionError>(job.folder.clone());
-    let summary = Session::start(&options, &job.plan, interrupted.clone(), folder)?.go_silently(
-        |run: &dyn Run| {
-            let time = run.row().time;
-            let due = figure.times.get(pictures.len());
-            if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
-                pictures.push(run.snapshot());
-            }
-            let part = (PARTS * time / end) as u64;
-            bar.inc(part.saturating_sub(counted));
-            counted = counted.max(part);
-        },
-    )?;
+    let claimed = || {
+        let claimed = job.claimed.lock().unwrap_or_else(PoisonError::into_inner).take();
+        claimed.ok_or(FolderError::Taken(job.folder.clone()))
+    };
+    let session =
+        Session::start::<Failure>(&options, &job.plan, interrupted.clone(), || Ok(claimed()?))?;
+    let summary = session.go_silently(|run: &dyn Run| {
+        let time = run.row().time;
+        let due = figure.times.get(pictures.len());
+        if due.is_some_and(|&t| time >= t * (1.0 - 1e-9)) {
+            pictures.push(run.snapshot());
+        }
+        let part = (PARTS * time / end) as u64;
+        bar.inc(part.saturating_sub(counted));
+        counted = counted.max(part);
+    })?;
     let outflow = summary.gauges.values().next();
     let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} m2", g.volume));
     let took = duration(summary.seconds.get("total").copied().unwrap_or_default());

@@ -23,6 +23,7 @@ mod verify;
 use crate::cases::CaseError;
 use crate::record::folder::FolderError;
 use crate::record::plots::PlotError;
+use crate::record::replace::ReplaceError;
 use crate::record::rerun_log::RecordError;
 use crate::scene::{self, Scene, SceneError, SceneSource};
 use crate::session::{SessionError, tell};
@@ -177,7 +178,9 @@ impl From<SessionError> for Failure {
     fn from(e: SessionError) -> Self {
         match e {
             SessionError::Sim(e) => Failure::Sim(e),
-            SessionError::Environment(text) => Failure::Environment(text),
+            SessionError::Environment(text) | SessionError::Unfit(text) => {
+                Failure::Environment(text)
+            }
             SessionError::Interrupted => Failure::Interrupted,
         }
     }
@@ -189,6 +192,11 @@ impl From<RecordError> for Failure {
 }
 impl From<PlotError> for Failure {
     fn from(e: PlotError) -> Self {
+        Failure::Environment(e.to_string())
+    }
+}
+impl From<ReplaceError> for Failure {
+    fn from(e: ReplaceError) -> Self {
         Failure::Environment(e.to_string())
     }
 }

@@ -3,6 +3,7 @@
 use super::run::{Output, close};
 use super::{Failure, print};
 use crate::record::checkpoint;
+use crate::record::folder::RunFolder;
 use crate::record::rerun_log::Sink;
 use crate::scene::{self, scene_hash};
 use crate::session::{Options, Safety, Session, SessionError, tell, watch_interrupts};
@@ -40,8 +41,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Environment(format!("{folder}: there is no such folder of a run")));
     }
     if is_finished(folder) {
-        let folder = folder.display();
-        return print(&format!("{folder}: the run is finished; there is nothing to continue"));
+        return finished(folder);
     }
     let source = scene::load(folder.join("scene.toml"))?;
     let (scene, plan) = super::resolve(&source)?;
@@ -55,13 +55,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         steps: args.steps,
         ..Options::default()
     };
+    let mut claimed = Some(RunFolder::claim(folder)?);
+    if is_finished(folder) {
+        return finished(folder);
+    }
     let mut faults = Vec::new();
     for (step, path) in checkpoint::list(folder) {
-        let opened = checkpoint::read(&path, &hash)
-            .map_err(|e| SessionError::Environment(e.to_string()))
-            .and_then(|state| {
-                Session::reopen(&options, &plan, folder.clone(), &state, interrupted.clone())
-            });
+        let opened = checkpoint::read(&path, &hash).map_err(SessionError::from).and_then(|state| {
+            Session::reopen(&options, &plan, &mut claimed, &state, interrupted.clone())
+        });
         match opened {
             Ok(session) => {
                 for fault in &faults {
@@ -72,7 +74,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 let _ = std::fs::remove_file(folder.join("summary.json"));
                 return close(session.go()?, args.output);
             }
-            Err(SessionError::Environment(text)) => faults.push(text),
+            Err(SessionError::Unfit(text)) => faults.push(text),
             Err(other) => return Err(other.into()),
         }
     }
@@ -83,6 +85,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
          {folder}/scene.toml --out {folder} --force` starts again; --checkpoint-every saves \
          checkpoints during a run"
     )))
+}
+
+fn finished(folder: &Path) -> Result<(), Failure> {
+    print(&format!("{}: the run is finished; there is nothing to continue", folder.display()))
 }
 
 /// Whether the summary in the folder says that the run is finished.

@@ -3,15 +3,15 @@
 
 use super::chosen;
 use super::{Failure, memory, print};
-use crate::record::folder;
+use crate::record::folder::{self, Loaded};
 use crate::record::rerun_log::Sink;
 use crate::record::summary::Ending;
 use crate::record::text::duration;
-use crate::scene::{Quantity, Scene, SceneSource, Scope};
+use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash};
 use crate::session::{
     Budget, Ended, Options, Recording, Safety, Session, tell, wait_for_interrupt, watch_interrupts,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Run a scene: a preset or a TOML file.
@@ -94,7 +94,8 @@ impl Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let source = super::source(&args.scene, &args.sets)?;
+    let (loaded, file) = super::find(&args.scene)?;
+    let source = loaded.with_sets(&args.sets)?;
     let chosen = chosen::choose(&source, args.accuracy, args.budget)?;
     let source = chosen.as_ref().map_or(Ok(source.clone()), |b| source.with_sets(&b.entry.sets))?;
     let (scene, plan) = match &args.until {
@@ -108,8 +109,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let interrupted = watch_interrupts(super::code::INTERRUPTED);
     let plan = Arc::new(plan);
     memory::afford(&plan)?;
+    let unchanged =
+        crate::scene::parse(&loaded).is_ok_and(|s| scene_hash(&s) == scene_hash(&scene));
     let session = Session::start(&args.options(), &plan, interrupted, || {
-        folder::create(&scene.name, args.out.as_deref(), args.force).map_err(Failure::from)
+        let loaded = file.then(|| Loaded { path: Path::new(&args.scene), unchanged });
+        let out = args.out.as_deref();
+        folder::create(&scene.name, out, args.force, loaded).map_err(Failure::from)
     })?;
     let budget = chosen.map(|b| Box::new(b) as Box<dyn Budget>);
     close(session.with_budget(budget).go()?, args.output)

@@ -1,6 +1,7 @@
 //! This module implements `grainscope stress`: hostile scenes, with a verdict for each.
 
 use super::{Failure, print};
+use crate::record::replace::{self, Kind};
 use crate::stress::{self, Outcome, Trial};
 use std::path::PathBuf;
 
@@ -50,8 +51,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(folder) = &args.write {
         let file = folder.join("stress.md");
         std::fs::create_dir_all(folder)
-            .and_then(|()| std::fs::write(&file, stress::markdown(&outcomes)))
-            .map_err(|e| Failure::Environment(format!("{}: {e}", file.display())))?;
+            .map_err(|e| Failure::Environment(format!("{}: {e}", folder.display())))?;
+        replace::write(&file, stress::markdown(&outcomes), Kind::Page)?;
     }
     conclude(args, &trials, &outcomes)
 }

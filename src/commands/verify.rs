@@ -2,6 +2,7 @@
 
 use super::{Failure, print};
 use crate::record::plots::{Axis, Curve, PlotSpec, svg_plot};
+use crate::record::replace::{self, Kind};
 use crate::verify::{self, Effort, Figure, Report, SUBJECTS};
 use std::path::{Path, PathBuf};
 
@@ -77,7 +78,7 @@ fn write(folder: &Path, report: &Report) -> Result<(), Failure> {
     let environment =
         |e: std::io::Error| Failure::Environment(format!("{}: {e}", folder.display()));
     std::fs::create_dir_all(&figures).map_err(environment)?;
-    std::fs::write(folder.join("verification.md"), markdown(report)).map_err(environment)?;
+    replace::write(&folder.join("verification.md"), markdown(report), Kind::Page)?;
     for figure in report.sections.iter().flat_map(|s| &s.figures) {
         svg_plot(&figures.join(&figure.name), &plot(figure))?;
     }

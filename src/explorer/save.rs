@@ -58,7 +58,8 @@ pub fn keep(
     out: &Path,
     name: &str,
 ) -> Result<(PathBuf, SavedState), SaveError> {
-    let folder = folder::create_below(out, checked(name)?)?;
+    let mut claimed = folder::create_below(out, checked(name)?)?;
+    let folder = claimed.path().to_owned();
     let at = |name: &str| folder.join(name);
     let write = |name: &str, text: String| {
         let path = at(name);
@@ -94,6 +95,7 @@ pub fn keep(
     );
     summary.write(&folder).map_err(SaveError::Summary)?;
     plots_of_run(&folder, &live.drive.plan, &live.rows)?;
+    claimed.settle(true);
     let files = folder::FILES.iter().filter_map(|name| {
         let size = std::fs::metadata(at(name)).ok()?.len();
         Some((name.to_string(), size))

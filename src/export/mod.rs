@@ -6,6 +6,7 @@ mod tables;
 mod vtu;
 
 use crate::frame::{GridField, ParticleSnapshot};
+use crate::record::replace::{self, Kind, ReplaceError};
 use crate::results::{Member, ResultsError, SAME_TIME};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,10 +23,13 @@ pub enum ExportError {
     /// The recording has no pictures.
     #[error("{}: its recording has no pictures", .0.display())]
     NoPictures(PathBuf),
-    /// A file or folder cannot be written.
+    /// A file is in the way, or cannot be written.
+    #[error(transparent)]
+    Replace(#[from] ReplaceError),
+    /// The folder cannot be made.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// Path of the file or folder.
+        /// Path of the folder.
         path: PathBuf,
         /// Error of the operating system.
         source: std::io::Error,
@@ -99,8 +103,14 @@ pub fn write(frames: &Frames, format: Format, folder: &Path) -> Result<usize, Ex
     }
 }
 
+/// Writes a VTK file or a table.
 fn write_file(path: PathBuf, text: impl AsRef<[u8]>) -> Result<(), ExportError> {
-    std::fs::write(&path, text).map_err(|source| ExportError::Write { path, source })
+    let text = text.as_ref();
+    let header = text.split(|&b| b == b'\n').next().unwrap_or_default();
+    let header = String::from_utf8_lossy(header);
+    let table = path.extension().is_some_and(|e| e == "csv");
+    let kind = if table { Kind::Table(&header) } else { Kind::Vtk };
+    Ok(replace::write(&path, text, kind)?)
 }
 
 impl Frames {

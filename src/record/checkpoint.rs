@@ -13,6 +13,7 @@
 //! name, flushed to the disk and then renamed, so an incomplete checkpoint never appears under its
 //! final name. The last [`KEPT`] checkpoints are kept.
 
+use super::replace::ReplaceError;
 use crate::sim::state::{Column, State};
 use sha2::{Digest, Sha256};
 use std::fs::File;
@@ -191,6 +192,23 @@ pub fn list(folder: &Path) -> Vec<(u64, PathBuf)> {
         .collect();
     all.sort_by(|a, b| b.cmp(a));
     all
+}
+
+/// Checks that the checkpoint folder of a run holds nothing but checkpoints.
+///
+/// # Errors
+/// It holds another file.
+pub fn only_ours(folder: &Path) -> Result<(), ReplaceError> {
+    for entry in std::fs::read_dir(folder.join(FOLDER)).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let ours = name.to_str().is_some_and(|n| {
+            n.starts_with(PREFIX) && (n.ends_with(SUFFIX) || n.ends_with(".part"))
+        });
+        if !ours {
+            return Err(ReplaceError::Foreign { path: entry.path(), what: "a checkpoint" });
+        }
+    }
+    Ok(())
 }
 
 /// Writes the checkpoint of a step, and removes all but the last [`KEPT`] ones.

@@ -8,6 +8,7 @@ pub mod info;
 pub mod logger;
 pub mod number;
 pub mod plots;
+pub mod replace;
 pub mod rerun_log;
 pub mod run_plots;
 pub mod series;

@@ -12,6 +12,7 @@ use scale::Scale;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use super::replace::{self, Kind, may_replace};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::FontStyle;
@@ -156,7 +157,7 @@ fn to_svg(path: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), St
         &format!("width=\"{}\" height=\"{}\"", size.0, size.1),
         1,
     );
-    std::fs::write(path, text).map_err(|e| e.to_string())
+    replace::write(path, text, Kind::Svg).map_err(|e| e.to_string())
 }
 
 fn to_png(path: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), String> {
@@ -170,6 +171,7 @@ fn to_png(path: &Path, figure: &impl Drawing, size: (u32, u32)) -> Result<(), St
         root.present().map_err(|e| e.to_string())?;
     }
     let small = average(&pixels, size);
+    may_replace(path, Kind::Png).map_err(|e| e.to_string())?;
     // The file is opened here first because the error of the encoder does not name its cause.
     std::fs::File::create(path).map_err(|e| e.to_string())?;
     let root = BitMapBackend::new(path, size).into_drawing_area();

@@ -23,6 +23,7 @@ mod decode;
 mod race;
 mod read;
 mod repair;
+mod salvage;
 mod side_by_side;
 mod sinks;
 mod stage;
@@ -40,7 +41,7 @@ use rerun::{EntityPath, EntityPathPart, RecordingStream};
 pub use decode::ReadError;
 pub use race::Race;
 pub use read::{Recorded, Sample};
-pub use repair::repair;
+pub use repair::{Repaired, repair};
 pub use side_by_side::{Difference, RecordedRun, SideBySide};
 pub use sinks::{Saved, Sink};
 pub use stage::Lane;
@@ -48,6 +49,7 @@ pub use viewer::with_viewer;
 
 use crate::frame::{Frame, Quantity, Rect, RunInfo};
 use crate::record::colour::ColourScale;
+use crate::record::replace::ReplaceError;
 use crate::web::stream::Stream;
 use sinks::{Destinations, Live, Page, RrdFile};
 
@@ -110,6 +112,9 @@ pub enum RecordError {
         /// Cause, as reported by the operating system or the encoder.
         cause: String,
     },
+    /// A file of another kind is in the way.
+    #[error(transparent)]
+    Replace(#[from] ReplaceError),
     /// The disk or a viewer did not respond when the run was interrupted.
     #[error("the recording is incomplete: the disk or the viewer does not respond")]
     Stuck,

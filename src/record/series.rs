@@ -11,6 +11,8 @@ pub struct SeriesWriter {
     out: File,
     /// Length of the complete rows (bytes).
     length: u64,
+    /// Number of these rows.
+    rows: u64,
     places: Vec<Place>,
 }
 
@@ -22,13 +24,13 @@ pub fn columns(plan: &Plan) -> Vec<String> {
 impl SeriesWriter {
     /// Creates the table and writes its header.
     pub fn create(path: &Path, plan: &Plan) -> std::io::Result<Self> {
-        let mut series = SeriesWriter { out: File::create(path)?, length: 0, places: places(plan) };
+        let mut series =
+            SeriesWriter { out: File::create(path)?, length: 0, rows: 0, places: places(plan) };
         series.append(&format!("{}\n", columns(plan).join(",")))?;
         Ok(series)
     }
 
-    /// Continues a table after `row`. Rows of later steps are removed; `row` itself is written if
-    /// the table lacks it.
+    /// Opens a table to continue it after `row`. Nothing is changed before [`SeriesWriter::cut`].
     pub fn resume(path: &Path, plan: &Plan, row: &Row) -> Result<Self, TableError> {
         let step = row.step;
         let fault = |source| TableError::File { path: path.to_path_buf(), source };
@@ -37,14 +39,16 @@ impl SeriesWriter {
             let path = path.to_path_buf();
             return Err(TableError::Short { path, rows: rows.len(), step });
         }
-        let mut out = File::options().write(true).open(path).map_err(fault)?;
-        out.set_len(length).map_err(fault)?;
-        out.seek(SeekFrom::End(0)).map_err(fault)?;
-        let mut series = SeriesWriter { out, length, places: places(plan) };
-        if rows.len() as u64 == step {
-            series.write(row).map_err(fault)?;
-        }
-        Ok(series)
+        let out = File::options().write(true).open(path).map_err(fault)?;
+        Ok(SeriesWriter { out, length, rows: rows.len() as u64, places: places(plan) })
+    }
+
+    /// Removes the rows of steps after `row` from a table that is continued; `row` itself is written
+    /// if the table lacks it.
+    pub fn cut(&mut self, row: &Row) -> std::io::Result<()> {
+        self.out.set_len(self.length)?;
+        self.out.seek(SeekFrom::End(0))?;
+        if self.rows == row.step { self.write(row) } else { Ok(()) }
     }
 
     /// Appends a line completely or not at all.

@@ -1,6 +1,7 @@
 //! This module builds `summary.json`: the settings, results and diagnostics of a run.
 
 use super::logger::Traffic;
+use super::replace::{self, Kind};
 use crate::scene::{Quadrature, scene_hash};
 use crate::sim::Run;
 use crate::sim::criteria::{ACCURATE_ENERGY, ENERGY_STEPS};
@@ -242,8 +243,8 @@ impl Summary {
     pub fn write(&self, folder: &Path) -> Result<String, String> {
         let json = serde_json::to_string_pretty(self).map_err(|e| e.to_string())?;
         let path = folder.join("summary.json");
-        std::fs::write(&path, format!("{json}\n"))
-            .map_err(|e| format!("cannot write {}: {e}", path.display()))?;
+        replace::write(&path, format!("{json}\n"), Kind::Json("state_hash"))
+            .map_err(|e| e.to_string())?;
         Ok(json)
     }
 

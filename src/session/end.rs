@@ -115,7 +115,7 @@ impl Session {
             run,
             tally,
             ending,
-            self.folder.display().to_string(),
+            self.folder.path().display().to_string(),
             self.recording.as_ref().map(|p| p.display().to_string()),
         );
         summary.purchase = self.budget.as_ref().map(|b| b.receipt(run, tally.wall));
@@ -132,8 +132,18 @@ impl Session {
             summary.warnings.push(w);
         }
         summary.error = failure.as_ref().and_then(SessionError::describe);
-        let json = summary.write(&self.folder).map_err(SessionError::Environment)?;
-        let plotted = self.plot();
+        // Of a run that a fault of the machine has ended, only a checkpoint is worth more than the
+        // earlier run that it was to replace.
+        let fault = matches!(failure, Some(SessionError::Environment(_)));
+        let restore = fault && self.folder.replaces() && self.kept.is_none_or(|step| step == 0);
+        let written = summary.write(self.folder.path()).map_err(SessionError::Environment);
+        let plotted = if written.is_ok() { self.plot() } else { Ok(()) };
+        if restore {
+            tell(format_args!("the earlier run remains in {}", self.folder.path().display()));
+        } else if let Some(place) = self.folder.settle(!fault && written.is_ok()) {
+            tell(format_args!("the earlier run is kept in {}", place.display()));
+        }
+        let json = written?;
         let (kept, wall, interrupted) = (self.kept, tally.wall, self.interrupted);
         Ok(Ended { summary, json, recorded, served, failure, plotted, kept, wall, interrupted })
     }
@@ -142,8 +152,8 @@ impl Session {
     /// not grow with the number of steps.
     fn plot(&self) -> Result<(), SessionError> {
         let plan = &self.drive.plan;
-        let rows = series::rows(&self.folder.join("series.csv"), plan)
+        let rows = series::rows(&self.folder.path().join("series.csv"), plan)
             .map_err(|e| SessionError::Environment(e.to_string()))?;
-        Ok(plots_of_run(&self.folder, plan, &rows)?)
+        Ok(plots_of_run(self.folder.path(), plan, &rows)?)
     }
 }

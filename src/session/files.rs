@@ -4,10 +4,10 @@ use super::drive::{self, Drive};
 use super::error::SessionError;
 use super::interrupts::{Interrupted, tell};
 use super::options::{Options, Recording, Safety};
-use super::past::Past;
+use super::past::{self, Past};
 use crate::plan::Plan;
 use crate::record::checkpoint;
-use crate::record::folder;
+use crate::record::folder::{self, RunFolder};
 use crate::record::info;
 use crate::record::logger::{Backpressure, Logger, Traffic};
 use crate::record::rerun_log::{RerunLog, Sink};
@@ -32,7 +32,7 @@ pub trait Budget: Send {
 /// A run with all its output files.
 pub struct Session {
     pub(super) drive: Drive,
-    pub(super) folder: PathBuf,
+    pub(super) folder: RunFolder,
     pub(super) series: SeriesWriter,
     /// Path of the recording, if any.
     pub(super) recording: Option<PathBuf>,
@@ -66,7 +66,7 @@ impl Session {
         options: &Options,
         plan: &Arc<Plan>,
         interrupted: Interrupted,
-        prepare: impl FnOnce() -> Result<PathBuf, E>,
+        prepare: impl FnOnce() -> Result<RunFolder, E>,
     ) -> Result<Session, E> {
         let clock = Instant::now();
         let run = sim::start(plan.clone()).map_err(SessionError::from)?;
@@ -77,14 +77,18 @@ impl Session {
         options: &Options,
         plan: &Arc<Plan>,
         run: Box<dyn Run>,
-        folder: PathBuf,
+        mut claimed: RunFolder,
         clock: Instant,
         interrupted: Interrupted,
     ) -> Result<Session, SessionError> {
+        let folder = claimed.path().to_owned();
         let recording = match &options.recording {
             Recording::None => None,
             Recording::Folder => Some(folder.join("recording.rrd")),
-            Recording::File(path) => Some(path.clone()),
+            Recording::File(path) => {
+                claimed.set_aside(path)?;
+                Some(path.clone())
+            }
         };
         let (logger, warnings) = start_logger(
             options,
@@ -94,11 +98,14 @@ impl Session {
             drive::warnings(plan),
             &interrupted,
         )?;
-        let scene_file = folder.join("scene.toml");
-        std::fs::write(&scene_file, to_toml(&plan.scene)).map_err(|e| cannot(&scene_file, e))?;
+        if !claimed.has_own_scene() {
+            let path = folder.join(folder::SCENE);
+            std::fs::write(&path, to_toml(&plan.scene)).map_err(|e| cannot(&path, e))?;
+        }
         let series_file = folder.join("series.csv");
         let series =
             SeriesWriter::create(&series_file, plan).map_err(|e| cannot(&series_file, e))?;
+        claimed.begin();
         let mut tally = Tally::new(warnings);
         tally.around.set_up = clock.elapsed().as_secs_f64() - run.row().seconds.total();
         Ok(Session {
@@ -106,7 +113,7 @@ impl Session {
             drive: Drive::new(plan.clone(), run, options.safety.policy(), tally),
             safety: options.safety,
             kept: None,
-            folder,
+            folder: claimed,
             series,
             recording,
             logger,
@@ -121,24 +128,30 @@ impl Session {
     }
 
     /// Resumes the run of a folder from a state. The table and the recording continue after the
-    /// step of the state.
+    /// step of the state; they are changed only when nothing else can fail.
     ///
     /// # Errors
-    /// The state does not fit the plan, or a file or viewer is not available.
+    /// The state does not fit the plan or the table ([`SessionError::Unfit`]), or a file or viewer
+    /// is not available.
     pub fn reopen(
         options: &Options,
         plan: &Arc<Plan>,
-        folder: PathBuf,
+        claimed: &mut Option<RunFolder>,
         state: &State,
         interrupted: Interrupted,
     ) -> Result<Session, SessionError> {
-        let unfit = |e: StateError| SessionError::Environment(e.to_string());
+        let unfit = |e: StateError| SessionError::Unfit(e.to_string());
+        let folder = match claimed {
+            Some(folder) => folder.path().to_owned(),
+            None => return Err(SessionError::Environment("the folder is not claimed".into())),
+        };
         let mut run = sim::start(plan.clone())?;
         run.restore(state).map_err(unfit)?;
         let row = run.row().clone();
-        let past = Past::load(state, &folder).map_err(unfit)?;
-        let series = SeriesWriter::resume(&folder.join("series.csv"), plan, &row)
-            .map_err(|e| SessionError::Environment(e.to_string()))?;
+        let mut past = Past::load(state, &folder).map_err(unfit)?;
+        past.warnings.extend(past.made_otherwise());
+        let path = folder.join("series.csv");
+        let mut series = SeriesWriter::resume(&path, plan, &row)?;
         let (logger, warnings) = start_logger(
             options,
             plan,
@@ -147,6 +160,10 @@ impl Session {
             past.warnings,
             &interrupted,
         )?;
+        series.cut(&row).map_err(|e| cannot(&path, e))?;
+        let folder = claimed
+            .take()
+            .ok_or_else(|| SessionError::Environment("the folder is not claimed".into()))?;
         let safety = options.safety.or(past.safety);
         let tally = Tally { warnings, ..past.tally };
         Ok(Session {
@@ -197,7 +214,7 @@ impl Session {
         {
             return Err(ended_early());
         }
-        let table = self.folder.join("series.csv");
+        let table = self.folder.path().join("series.csv");
         self.series.settle().map_err(|e| cannot(&table, e))?;
         self.keep_state()
     }
@@ -212,9 +229,10 @@ impl Session {
             recording: self.recording.clone(),
             warnings: self.drive.tally.warnings.clone(),
             safety: self.safety,
+            made_by: past::this_program(),
         }
-        .save(&mut state, &self.folder);
-        checkpoint::write(&self.folder, step, &state, &self.scene_hash)
+        .save(&mut state, self.folder.path());
+        checkpoint::write(self.folder.path(), step, &state, &self.scene_hash)
             .map_err(|e| SessionError::Environment(e.to_string()))?;
         self.kept = Some(step);
         Ok(())
@@ -305,7 +323,7 @@ impl Session {
     /// Writes the current row to the table, and a frame to the recording.
     fn observe(&mut self, notes: Vec<String>) -> Result<(), SessionError> {
         let clock = Instant::now();
-        let table = self.folder.join("series.csv");
+        let table = self.folder.path().join("series.csv");
         let row = self.drive.run.row();
         self.series.write(row).map_err(|e| cannot(&table, e))?;
         self.drive.tally.add(row);
@@ -355,7 +373,7 @@ fn start_logger(
     let about = info::run_info(plan, &name);
     let mut last_step = None;
     let log = if step == 0 {
-        RerunLog::open(&about, &sinks).inspect_err(|_| folder::abandon(folder))?
+        RerunLog::open(&about, &sinks)?
     } else {
         let resumed = RerunLog::resume(&about, &sinks, step)?;
         if let Some(notice) = resumed.notice {

@@ -4,6 +4,7 @@ use super::options::Safety;
 use crate::record::logger::Traffic;
 use crate::record::summary::{Around, Tally};
 use crate::sim::state::{State, StateError, load_phases, save_phases};
+use crate::simd::Simd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -19,6 +20,13 @@ pub struct Past {
     pub warnings: Vec<String>,
     /// Options of the run.
     pub safety: Safety,
+    /// Version and instruction set of the program that wrote the checkpoint.
+    pub made_by: [String; 2],
+}
+
+/// Version and instruction set of this program.
+pub fn this_program() -> [String; 2] {
+    [env!("CARGO_PKG_VERSION").into(), Simd::used().set().name().into()]
 }
 
 impl Past {
@@ -50,7 +58,23 @@ impl Past {
             state.put_bytes("session.recording", path.to_string_lossy().bytes());
         }
         state.put_bytes("session.warnings", self.warnings.join("\n").bytes());
-        state.put_bytes("session.program", env!("CARGO_PKG_VERSION").bytes());
+        let [version, simd] = &self.made_by;
+        state.put_bytes("session.program", version.bytes());
+        state.put_bytes("session.simd", simd.bytes());
+    }
+
+    /// A warning if another version of this program, or another instruction set, made the earlier
+    /// part of the run.
+    pub fn made_otherwise(&self) -> Option<String> {
+        let [version, simd] = this_program();
+        let [old_version, old_simd] = &self.made_by;
+        (*old_version != version || *old_simd != simd).then(|| {
+            format!(
+                "the checkpoint was written by version {old_version} with the instruction set \
+                 {old_simd}; this is version {version} with {simd}, so the run is not bitwise that \
+                 of a single program"
+            )
+        })
     }
 
     /// Loads the data that [`Past::save`] wrote. `folder`: folder of the run.
@@ -82,6 +106,8 @@ impl Past {
             recording,
             warnings: state.text("session.warnings")?.lines().map(String::from).collect(),
             safety: Safety::load(state)?,
+            made_by: ["session.program", "session.simd"]
+                .map(|name| state.text(name).unwrap_or("unknown").to_owned()),
         })
     }
 }

@@ -20,6 +20,7 @@ pub use spec::{PlotSpec, Spec, preset_list, preset_source, read_file, similar};
 pub use store::{State, Store};
 pub use vary::Sample;
 
+use crate::record::replace::ReplaceError;
 use crate::scene::SceneError;
 use crate::simd::{self, Simd};
 use indexmap::IndexMap;
@@ -52,6 +53,9 @@ pub enum SweepError {
         /// Description of the error.
         cause: String,
     },
+    /// A file is in the way.
+    #[error(transparent)]
+    Replace(#[from] ReplaceError),
     /// The engine failed.
     #[error("{0}")]
     Engine(String),

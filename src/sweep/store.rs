@@ -7,7 +7,10 @@
 //! running/<id>              unfinished runs, each under a lock
 //! ```
 
+use super::spec::is_plain;
 use super::{Case, List, SweepError};
+use crate::record::replace::{self, Kind, ReplaceError};
+use crate::record::{checkpoint, folder};
 use crate::scene::SceneSource;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
@@ -16,6 +19,9 @@ use std::path::{Path, PathBuf};
 
 /// Name of the file with the [`Note`] of a case, in the folder of its run.
 const NOTE: &str = "case.json";
+
+/// Kind of the list of cases.
+const LIST: Kind<'static> = Kind::Json("cases");
 
 /// The folder of a sweep.
 #[derive(Clone, Debug)]
@@ -77,8 +83,16 @@ impl Store {
         fs::create_dir_all(&self.root).map_err(SweepError::file("make", &self.root))?;
         let json = serde_json::to_string_pretty(list)
             .map_err(|e| SweepError::Broken { path: self.cases(), cause: e.to_string() })?;
-        replace(&self.scene(), source.text())?;
-        replace(&self.cases(), &format!("{json}\n"))
+        // A scene beside a list of cases is that of the sweep; any other is the user's.
+        let before = fs::read_to_string(self.scene()).ok();
+        if before.as_deref() != Some(source.text()) {
+            if before.is_some() && !self.cases().exists() {
+                let what = "the scene of a sweep";
+                return Err(ReplaceError::Foreign { path: self.scene(), what }.into());
+            }
+            replace::write(&self.scene(), source.text(), Kind::Table(""))?;
+        }
+        Ok(replace::write(&self.cases(), format!("{json}\n"), LIST)?)
     }
 
     /// Reads the list of cases and the scene of the sweep.
@@ -93,10 +107,11 @@ impl Store {
             )));
         }
         let text = fs::read_to_string(&path).map_err(SweepError::file("read", &path))?;
-        let list = serde_json::from_str(&text).map_err(|e| SweepError::Broken {
-            path,
+        let list: List = serde_json::from_str(&text).map_err(|e| SweepError::Broken {
+            path: path.clone(),
             cause: format!("is not a list of cases: {e}"),
         })?;
+        check_names(&list).map_err(|cause| SweepError::Broken { path, cause })?;
         let scene = self.scene();
         let text = fs::read_to_string(&scene).map_err(SweepError::file("read", &scene))?;
         Ok((list, SceneSource::new(scene.display().to_string(), text)))
@@ -274,22 +289,39 @@ fn correct_paths(from: &Path, to: &Path) {
     let _ = fs::write(&path, format!("{json}\n"));
 }
 
+/// Checks the names in a list: they become names of folders.
+fn check_names(list: &List) -> Result<(), String> {
+    let names = list.cases.iter().map(|c| &c.id).chain(Some(&list.spec.name));
+    match names.into_iter().find(|name| !is_plain(name)) {
+        Some(name) => Err(format!(
+            "the name {name:?} is not one that grainscope gives: expected letters, digits, `_` and \
+             `-`; make the list again with `grainscope sweep`"
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Removes the folder of a case if everything in it was written by this program.
 fn remove(folder: &Path) -> Result<(), SweepError> {
+    let strange =
+        |path: PathBuf| SweepError::from(ReplaceError::Foreign { path, what: "part of a case" });
+    if fs::symlink_metadata(folder).is_ok_and(|m| !m.is_dir()) {
+        return Err(strange(folder.to_owned()));
+    }
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let ours = name.to_str().is_some_and(|n| n == NOTE || folder::is_ours(n));
+        if !ours {
+            return Err(strange(entry.path()));
+        }
+    }
+    checkpoint::only_ours(folder)?;
     match fs::remove_dir_all(folder) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
             Err(SweepError::file("remove", folder)(e))
         }
         _ => Ok(()),
     }
-}
-
-/// Replaces a file atomically: readers see either the old or the new content.
-fn replace(path: &Path, text: &str) -> Result<(), SweepError> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(format!(".{}", std::process::id()));
-    let beside = PathBuf::from(beside);
-    fs::write(&beside, text).map_err(SweepError::file("write", &beside))?;
-    fs::rename(&beside, path).map_err(SweepError::file("write", path))
 }
 
 /// Time in the last complete row of a series (s).

@@ -5,6 +5,7 @@ mod compare;
 mod cost;
 mod environment;
 mod hostile;
+mod keeping;
 mod killed;
 mod recording;
 mod refusals;

@@ -1,8 +1,9 @@
 //! Runs a single case of a sweep.
 
 use super::super::Failure;
+use crate::record::folder::RunFolder;
 use crate::scene::SceneSource;
-use crate::session::{Interrupted, Options, Recording, Session, SessionError, watch_interrupts};
+use crate::session::{Interrupted, Options, Recording, Session, watch_interrupts};
 use crate::sweep::{Case, Store};
 use std::path::Path;
 use std::sync::Arc;
@@ -45,8 +46,8 @@ pub(super) fn solve(
     let plan = Arc::new(case.plan(source)?);
     let recording = if recorded { Recording::Folder } else { Recording::None };
     let options = Options { quiet: true, recording, ..Options::default() };
-    let folder = || Ok::<_, SessionError>(folder.to_owned());
-    Session::start(&options, &plan, interrupted.clone(), folder)?.go_silently(|_| ())?;
+    let claim = || Ok::<_, Failure>(RunFolder::claim(folder)?);
+    Session::start(&options, &plan, interrupted.clone(), claim)?.go_silently(|_| ())?;
     Ok(())
 }
 

@@ -90,7 +90,7 @@ thread_local! {
 }
 
 /// Runs `decode` and turns a panic into an error, without printing the panic message.
-fn calmly<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
+pub(super) fn calmly<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let usual = std::panic::take_hook();
@@ -107,11 +107,11 @@ fn calmly<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
 }
 
 /// Kind of the message that ends a recording.
-const END: u64 = 0;
+pub(super) const END: u64 = 0;
 /// Kind of a message with data in Arrow format.
-const ARROW: u64 = 2;
+pub(super) const ARROW: u64 = 2;
 /// Largest known kind of message.
-const LAST_KIND: u64 = 3;
+pub(super) const LAST_KIND: u64 = 3;
 /// Tolerance of the length checks (bytes).
 const SLACK: u64 = 1 << 16;
 
@@ -147,7 +147,7 @@ fn sound_length(file: &mut (impl Read + Seek)) -> std::io::Result<u64> {
 }
 
 /// Whether the lengths of the data of a message are valid, both compressed and uncompressed.
-fn is_sound(message: &[u8], unpacked: &mut Vec<u8>) -> bool {
+pub(super) fn is_sound(message: &[u8], unpacked: &mut Vec<u8>) -> bool {
     /// Largest compression ratio of LZ4.
     const LARGEST_RATIO: u64 = 255;
     /// Largest accepted message (bytes). The picture of 512 x 512 cells has 4e7.
@@ -255,7 +255,7 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
 
 /// Whether a file has the footer that is written when a recording is closed. The decoder also
 /// accepts an end without a footer.
-fn is_closed(file: &mut File) -> std::io::Result<bool> {
+pub(super) fn is_closed(file: &mut File) -> std::io::Result<bool> {
     // The footer ends with two identifiers and the number of its entries.
     const TAIL: i64 = 12;
     let mut names = [0; 8];

@@ -5,7 +5,7 @@
 //! [`RerunLog::resume`] copies it, up to the step of a checkpoint, into the continued recording.
 //! Both write under a temporary name and then rename, so that no recording is lost.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 use rerun::EntityPath;
@@ -16,9 +16,11 @@ use rerun::sink::LogSink;
 use super::decode::ReadError;
 use super::decode::{chunk_of, messages};
 use super::read::below_run;
+use super::salvage::{Damage, salvage};
 use super::sinks::{Destinations, RrdFile, Saved, Sink};
 use super::{RecordError, RerunLog, STEP};
 use crate::frame::RunInfo;
+use crate::record::replace::{Kind, beside, may_replace};
 
 /// The valid part of a recording.
 #[derive(Debug, Default)]
@@ -27,6 +29,10 @@ pub struct Kept {
     pub messages: usize,
     /// The last step; `None` if there is none.
     pub last_step: Option<u64>,
+    /// Steps of which a picture is kept.
+    pub pictures: BTreeSet<u64>,
+    /// Steps of which a value of a curve is kept.
+    pub rows: BTreeSet<u64>,
     /// Reason why the end is missing; `None` if the recording is complete.
     pub cut: Option<String>,
     /// Whether the scene, and so all constant data, is present.
@@ -91,6 +97,14 @@ impl Kept {
         let limit = until.map_or(i64::MAX, |step| i64::try_from(step).unwrap_or(i64::MAX));
         let good = steps.times_raw().iter().take_while(|&&step| step <= limit).count();
         let last = steps.times_raw().get(good.saturating_sub(1)).filter(|_| good > 0);
+        let kept = steps.times_raw().iter().take(good).filter_map(|&s| u64::try_from(s).ok());
+        match path.as_slice() {
+            [world, particles] if world == "world" && particles == "particles" => {
+                self.pictures.extend(kept);
+            }
+            [world, ..] if world == "world" => {}
+            _ => self.rows.extend(kept),
+        }
         self.last_step = self.last_step.max(last.and_then(|&step| u64::try_from(step).ok()));
         if good == chunk.num_rows() {
             return Ok(Some(LogMsg::ArrowMsg(store, arrow)));
@@ -104,13 +118,6 @@ impl Kept {
     }
 }
 
-/// Temporary path beside a recording, where its successor is written.
-fn beside(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    PathBuf::from(name)
-}
-
 /// Error of repairing a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RepairError {
@@ -122,22 +129,62 @@ pub enum RepairError {
     Record(#[from] RecordError),
 }
 
-/// Closes a recording whose end is missing. A complete recording is not changed.
-pub fn repair(path: &Path) -> Result<(Kept, Option<Saved>), RepairError> {
-    let kept = keep(path, None, |_| {})?;
-    if kept.cut.is_none() {
-        return Ok((kept, None));
+/// What a repair has done.
+#[derive(Debug)]
+pub struct Repaired {
+    /// The part that is kept.
+    pub kept: Kept,
+    /// What was lost.
+    pub damage: Damage,
+    /// The repaired file; `None` if the recording was complete.
+    pub saved: Option<Saved>,
+    /// Place of the original, if something of it was lost.
+    pub original: Option<PathBuf>,
+}
+
+/// Closes a recording whose end is missing, and removes damaged parts; the original of a damaged
+/// recording is kept beside it. A complete recording is not changed.
+pub fn repair(path: &Path) -> Result<Repaired, RepairError> {
+    let mut kept = Kept::default();
+    let damage = salvage(path, |message| {
+        kept.take(message, None).inspect(|m| kept.messages += usize::from(m.is_some())).ok();
+    })?;
+    if kept.messages == 0 {
+        let cause = "it holds nothing that can be read".to_owned();
+        return Err(ReadError::Unreadable { path: path.to_owned(), cause }.into());
     }
-    let part = beside(path);
+    if damage == Damage::default() {
+        return Ok(Repaired { kept, damage, saved: None, original: None });
+    }
+    let part = beside(path, ".part");
     let mut file = RrdFile::create(&part)?;
-    let copied = keep(path, None, |message| file.send(message))?;
-    let saved = file.finish().and_then(|_| file.settle(Some(path)));
-    if saved.is_err() {
+    salvage(path, |message| file.send(message))?;
+    let written = file.finish().and_then(|_| file.settle(None));
+    let mut original = None;
+    let placed = written.and_then(|()| {
+        if damage.places > 0 {
+            original = Some(set_aside(path)?);
+        }
+        file.settle(Some(path))
+    });
+    if placed.is_err() {
         let _ = std::fs::remove_file(&part);
     }
-    saved?;
-    let saved = file.finished()?;
-    Ok((copied, Some(saved)))
+    placed?;
+    let saved = Some(file.finished()?);
+    Ok(Repaired { kept, damage, saved, original })
+}
+
+/// Renames a damaged recording; returns its new path.
+fn set_aside(path: &Path) -> Result<PathBuf, RecordError> {
+    let names = (1..).map(|k| beside(path, &format!(".damaged-{k}")));
+    let Some(place) = names.take(1000).find(|place| !place.exists()) else {
+        let cause = "a thousand damaged originals are kept beside it".to_owned();
+        return Err(RecordError::Write { path: path.to_owned(), cause });
+    };
+    std::fs::rename(path, &place)
+        .map_err(|e| RecordError::Write { path: path.to_owned(), cause: e.to_string() })?;
+    Ok(place)
 }
 
 impl RerunLog {
@@ -155,7 +202,9 @@ impl RerunLog {
             let notice = Some(format!("the viewer shows the run from step {step} on"));
             return Ok(Resumed { log, last_step: None, notice });
         };
-        let part = beside(&path);
+        // The path is part of the checkpoint, which may come from elsewhere.
+        may_replace(&path, Kind::Recording)?;
+        let part = beside(&path, ".part");
         let aside = |sink: &Sink| match sink {
             Sink::Save(_) => Sink::Save(part.clone()),
             other => other.clone(),

@@ -23,6 +23,7 @@ use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
 use rerun::RecordingStream;
 
 use super::{APPLICATION, FILE_TICK, RecordError};
+use crate::record::replace::{Kind, may_replace};
 use crate::web::stream::Stream;
 
 /// Time after which a viewer that accepts no data is given up.
@@ -68,6 +69,7 @@ impl RrdFile {
     /// Creates the file and writes its header.
     pub(super) fn create(path: &Path) -> Result<Self, RecordError> {
         let failed = |cause: String| RecordError::Write { path: path.to_owned(), cause };
+        may_replace(path, Kind::Recording)?;
         let file = File::create(path).map_err(|e| failed(e.to_string()))?;
         let handle = file.try_clone().map_err(|e| failed(e.to_string()))?;
         let encoder =
