@@ -21,8 +21,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Err(Failure::Environment(text)) = super::memory::afford(&plan) {
         tell(format_args!("warning: {text}"));
     }
-    sim::initial::particles(&plan).map_err(sim::SimError::from)?;
-    for w in &plan.warnings {
+    let (_, empty) = sim::initial::particles(&plan).map_err(sim::SimError::from)?;
+    for w in plan.warnings.iter().chain(&sim::empty_regions(&plan, empty)) {
         eprintln!("warning: {w}");
     }
     print(&format!("{}: ok ({})", source.name(), scene.name))

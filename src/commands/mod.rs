@@ -26,7 +26,7 @@ use crate::record::plots::PlotError;
 use crate::record::replace::ReplaceError;
 use crate::record::rerun_log::RecordError;
 use crate::scene::{self, Scene, SceneError, SceneSource};
-use crate::session::{SessionError, tell};
+use crate::session::{SessionError, handle_file_size_limit, tell};
 use crate::sim::SimError;
 use crate::simd::{self, InstructionSet, Simd};
 use clap::{CommandFactory, Parser, Subcommand};
@@ -254,6 +254,7 @@ impl Failure {
 /// Reads the command line, runs the command and returns the exit code.
 pub fn main() -> ExitCode {
     let Cli { command, threads, simd } = Cli::parse();
+    handle_file_size_limit();
     let outcome =
         set_threads(threads).and_then(|()| set_simd(simd)).and_then(|()| run_command(command));
     match outcome {

@@ -182,7 +182,11 @@ fn report(ended: &Ended, profile: bool) -> String {
         duration(ended.wall)
     );
     for (name, g) in &s.gauges {
-        out += &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s\n", g.volume, g.rate);
+        out += &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s", g.volume, g.rate);
+        if g.refilled != 0.0 {
+            out += &format!(", and {:.1e} m2 carried across by refilling empty cells", g.refilled);
+        }
+        out.push('\n');
     }
     if let Some(p) = &s.purchase {
         out += &chosen::receipt_text(p);

@@ -5,6 +5,7 @@ use crate::plan::Gauge;
 use crate::space::flow::Flow;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
+use crate::space::population::Refill;
 use crate::space::segment::Segment;
 use crate::space::shape::Shape;
 
@@ -16,24 +17,42 @@ pub struct Counter {
     /// Net volume per depth of the gauge's material that has crossed along its direction since the
     /// start, in the plan's units.
     pub volume: f64,
+    /// The same for volume that the refilling of empty cells has carried across it.
+    pub refilled: f64,
 }
 
 /// Number of flux samples along the edge of a cell.
 const SAMPLES: usize = 8;
-/// Width of the kernel that determines the material at a sample, in cells.
-const KERNEL_WIDTH: f64 = 0.25;
+/// Widths of the kernel that determines the material at a sample, across and along the gauge, in
+/// cells.
+const KERNEL_WIDTH: [f64; 2] = [0.75, 0.25];
 
 impl Counter {
     /// A counter at zero.
     pub fn new(gauge: Gauge) -> Self {
-        Counter { gauge, volume: 0.0 }
+        Counter { gauge, volume: 0.0, refilled: 0.0 }
     }
 
     /// Counts a particle if its straight path (not wrapped) crosses the gauge.
     pub fn pass(&mut self, mesh: &Mesh, from: [f64; 2], to: [f64; 2], material: u8, volume: f64) {
+        self.volume += self.crossed(mesh, from, to, material, volume);
+    }
+
+    /// Counts the volume of a refilled cell if it came across the gauge.
+    pub fn refill(&mut self, mesh: &Mesh, refill: &Refill) {
+        let [from, to] = refill.cells.map(|cell| mesh.cell_centre(cell));
+        // The cells share a face, perhaps across a periodic side.
+        let d = [mesh.x.nearest_image(to[0] - from[0]), mesh.y.nearest_image(to[1] - from[1])];
+        let to = [from[0] + d[0], from[1] + d[1]];
+        self.refilled += self.crossed(mesh, from, to, refill.material, refill.volume);
+    }
+
+    /// Volume that crosses the gauge on a straight path, not wrapped.
+    fn crossed(&self, mesh: &Mesh, from: [f64; 2], to: [f64; 2], material: u8, volume: f64) -> f64 {
         let Gauge { segment: s, sign, .. } = self.gauge;
+        let mut sum = 0.0;
         if material != self.gauge.material {
-            return;
+            return sum;
         }
         let (axis, _) = mesh.axes(s.normal);
         let period = if axis.periodic() { axis.length() } else { 0.0 };
@@ -47,15 +66,16 @@ impl Counter {
             let t = (at - a) / (b - a);
             let along = from[1 - s.normal] + t * (to[1 - s.normal] - from[1 - s.normal]);
             if along >= s.from && along <= s.to {
-                self.volume += if b >= at { sign * volume } else { -sign * volume };
+                sum += if b >= at { sign * volume } else { -sign * volume };
             }
         }
+        sum
     }
 
     /// Flux of the material along the gauge's direction, from the velocity field, in the plan's
-    /// units. The fraction of the material at a sample is a kernel mean over the particles on both
-    /// sides of the gauge: with those of one side only, the rate of the default silo jumps by up to
-    /// a quarter from step to step.
+    /// units. The fraction of the material at a sample is a kernel mean over the particles of the
+    /// upstream cells nearby. With those of one cell only, the rate of the default silo jumps by up
+    /// to a quarter from step to step.
     pub fn rate<const D: usize>(
         &self,
         mesh: &Mesh,
@@ -83,11 +103,10 @@ impl Counter {
                 let r = if normal == 0 { [edge, t] } else { [t, edge] };
                 let n = Shape::values(r);
                 let u: f64 = (0..9).map(|a| n[a] * nodal[a][normal]).sum();
-                let mut mean = KernelMean::new(mesh, owner, r, g.material);
-                for k in around.clone() {
-                    for near in [below, above].into_iter().filter_map(|m| cell(m, k)) {
-                        mean.add(particles, near);
-                    }
+                let mut mean = KernelMean::new(mesh, owner, (r, normal), g.material);
+                let upstream = if u > 0.0 { below.or(above) } else { above.or(below) };
+                for near in around.clone().filter_map(|k| cell(upstream, k)) {
+                    mean.add(particles, near);
                 }
                 let share = mean.value().unwrap_or(f64::from(background == Some(g.material)));
                 flux += g.sign * share * u * mesh.face_area(owner, normal) / SAMPLES as f64;
@@ -109,8 +128,9 @@ struct KernelMean<'a> {
 
 impl<'a> KernelMean<'a> {
     /// A mean without particles, at reference coordinates `r` of a cell.
-    fn new(mesh: &'a Mesh, cell: usize, r: [f64; 2], material: u8) -> Self {
-        let width = mesh.cell_size(cell).map(|h| KERNEL_WIDTH * h);
+    fn new(mesh: &'a Mesh, cell: usize, (r, normal): ([f64; 2], usize), material: u8) -> Self {
+        let size = mesh.cell_size(cell);
+        let width = [0, 1].map(|c| KERNEL_WIDTH[usize::from(c != normal)] * size[c]);
         let at = mesh.from_reference(cell, r);
         KernelMean { mesh, at, width, material, of_material: 0.0, of_all: 0.0 }
     }

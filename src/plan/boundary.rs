@@ -229,7 +229,8 @@ pub(super) fn boundary(
     if closed {
         let (net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
         if net.abs() > 1e-9 * total {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                "boundaries",
                 format!(
                     "the given normal velocities let {:.3e} m2/s of incompressible fluid flow out",
                     net * units.area_rate()

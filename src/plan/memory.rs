@@ -70,6 +70,51 @@ pub fn available() -> Option<f64> {
     // A container may have less memory than its machine. Its file cache is released on demand, so
     // only the memory held by programs counts.
     let limit = system.cgroup_limits().map(|l| l.total_memory.saturating_sub(l.rss));
-    let least = limit.filter(|&l| l > 0).map_or(free, |l| l.min(free));
+    let own = [("Max address space", "VmSize:"), ("Max data size", "VmData:")];
+    let own = own.into_iter().filter_map(|(limit, used)| left_by_limit(limit, used));
+    let least = limit.filter(|&l| l > 0).into_iter().chain(own).fold(free, u64::min);
     (least > 0).then_some(least as f64)
+}
+
+/// Bytes that a limit of this process (`ulimit`) leaves; `None` without a limit, or where the system
+/// does not tell.
+fn left_by_limit(limit: &str, used: &str) -> Option<u64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|l| l.strip_prefix(limit))?;
+    let most: u64 = line.split_whitespace().next()?.parse().ok()?;
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix(used))?;
+    let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;
+    // At least a byte: zero would mean unknown.
+    Some(most.saturating_sub(1024 * kilobytes).max(1))
+}
+
+/// A run that needs more memory than there is.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{cells} cells need about {needed}, and this machine has {} left", size(*.free))]
+pub struct TooLarge {
+    cells: String,
+    needed: Memory,
+    free: f64,
+}
+
+impl TooLarge {
+    /// What the user can do.
+    pub const REMEDY: &str =
+        "lower accuracy.cells or accuracy.particles_per_cell, or use a larger machine";
+}
+
+/// Checks that there is enough memory for a run of a plan.
+///
+/// # Errors
+/// There is not.
+pub fn afford(plan: &Plan) -> Result<(), TooLarge> {
+    let needed = Memory::of(plan);
+    match available() {
+        Some(free) if needed.total() > free => {
+            let cells = format!("{} x {}", plan.mesh.x.cells(), plan.mesh.y.cells());
+            Err(TooLarge { cells, needed, free })
+        }
+        _ => Ok(()),
+    }
 }

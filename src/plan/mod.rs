@@ -39,6 +39,8 @@ pub const MAX_MATERIALS: usize = 16;
 pub struct Plan {
     /// The scene as read.
     pub scene: Scene,
+    /// Point (m) relative to which positions are computed.
+    pub origin: [f64; 2],
     /// Units of the plan.
     pub units: Units,
     /// The mesh.
@@ -336,7 +338,12 @@ impl Plan {
         due
     }
 
-    /// SI coordinates, m, of a point given in the plan's units.
+    /// A point (m, as in the scene) in the plan's units.
+    pub fn internal(&self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|c| (p[c] - self.origin[c]) / self.units.length)
+    }
+
+    /// SI coordinates, m, relative to the origin, of a point given in the plan's units.
     pub fn si(&self, p: [f64; 2]) -> [f64; 2] {
         p.map(|c| c * self.units.length)
     }

@@ -61,6 +61,18 @@ pub enum Warning {
         /// Number of cells.
         count: u64,
     },
+    /// The domain is far from zero.
+    FarDomain {
+        /// Its lower left corner, m.
+        corner: [f64; 2],
+    },
+    /// Regions are too small to contain a particle.
+    RegionsEmpty {
+        /// Indices of the regions.
+        regions: Vec<usize>,
+    },
+    /// A denser material rests exactly level on a lighter one.
+    UnstableRest,
     /// A side has a prescribed velocity through it.
     ThroughFlow {
         /// Side of the domain, as its key in the scene.
@@ -121,6 +133,26 @@ impl fmt::Display for Warning {
                 f,
                 "{count} cells lost all their particles and were refilled from neighbours; \
                  lower time.courant or raise accuracy.particles_per_cell"
+            ),
+            Warning::FarDomain { corner: [x, y] } => write!(
+                f,
+                "the domain is far from zero: positions are computed, recorded and exported \
+                 relative to its lower left corner ({x}, {y}) m"
+            ),
+            Warning::RegionsEmpty { regions } => {
+                let list: Vec<String> = regions.iter().map(|k| format!("regions[{k}]")).collect();
+                write!(
+                    f,
+                    "{} holds no particle: it is smaller than their spacing; enlarge it, raise \
+                     accuracy.cells, or remove it",
+                    list.join(", ")
+                )
+            }
+            Warning::UnstableRest => write!(
+                f,
+                "a denser material lies level on a lighter one: this is an exact equilibrium, and \
+                 nothing moves although it is unstable; perturb it, for instance by a region with \
+                 shape.where = \"y < 0.5 + 0.01*cos(pi*x)\""
             ),
             Warning::ThroughFlow { place } => write!(
                 f,

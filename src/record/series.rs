@@ -167,7 +167,7 @@ fn parse(line: &str, places: &[Place], plan: &Plan) -> Result<Row, String> {
         return Err(format!("{} values; {} were expected", values.len(), places.len()));
     }
     let mut row = Row::empty(plan.state.materials.len());
-    row.gauges = plan.gauges.iter().map(|_| GaugeRow { volume: 0.0, rate: 0.0 }).collect();
+    row.gauges = plan.gauges.iter().map(|_| GaugeRow::default()).collect();
     places.iter().zip(&values).try_for_each(|(place, text)| place.set(&mut row, text))?;
     Ok(row)
 }

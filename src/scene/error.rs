@@ -6,6 +6,7 @@ use std::sync::Arc;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use thiserror::Error;
 
+use super::keys::span_of;
 use super::source::SceneSource;
 
 /// Largest number of errors reported at once.
@@ -31,10 +32,19 @@ pub struct SceneError {
     span: Option<SourceSpan>,
     #[source_code]
     text: Option<Arc<NamedSource<String>>>,
-    /// `file` or `file:line:column`.
-    place: Option<Box<str>>,
+    site: Box<Site>,
     #[related]
     related: Vec<SceneError>,
+}
+
+/// Where the fault is, as far as it is known.
+#[derive(Clone, Debug)]
+enum Site {
+    Unknown,
+    /// A key of the scene.
+    Key(Box<str>),
+    /// `file` or `file:line:column`.
+    Place(Box<str>),
 }
 
 /// Something that an error can point at: a value of the scene or a byte range of its text.
@@ -61,6 +71,11 @@ impl SceneError {
         Self::at(&None::<Range<usize>>, message, help)
     }
 
+    /// An error at a key such as `accuracy.cells` or `gauges[1].material`.
+    pub fn of_key(key: impl AsRef<str>, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
+        SceneError { site: Box::new(Site::Key(key.as_ref().into())), ..Self::new(message, help) }
+    }
+
     /// An error at a value or a byte range; an empty `help` is omitted.
     pub fn at(place: &impl Place, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
         let help = help.as_ref();
@@ -70,7 +85,7 @@ impl SceneError {
             label: "here".into(),
             span: place.place().map(SourceSpan::from),
             text: None,
-            place: None,
+            site: Box::new(Site::Unknown),
             related: vec![],
         }
     }
@@ -83,7 +98,7 @@ impl SceneError {
 
     /// Adds file name and text to this error and to all related errors that have none yet.
     pub fn with_source(mut self, source: &SceneSource) -> Self {
-        if self.place.is_none() {
+        if !matches!(*self.site, Site::Place(_)) {
             self.locate(source);
         }
         self.related = self.related.into_iter().map(|e| e.with_source(source)).collect();
@@ -92,8 +107,11 @@ impl SceneError {
 
     fn locate(&mut self, source: &SceneSource) {
         let name = printable(source.name());
+        if let (None, Site::Key(key)) = (self.span, &*self.site) {
+            self.span = span_of(source.text(), key).map(SourceSpan::from);
+        }
         let Some(span) = self.span else {
-            self.place = Some(name.into());
+            *self.site = Site::Place(name.into());
             return;
         };
         let text = source.text();
@@ -113,7 +131,7 @@ impl SceneError {
             let help = self.help.take().map(|help| format!("{help}; ")).unwrap_or_default();
             self.help = Some(format!("{help}at {place}").into());
         }
-        self.place = Some(place.into());
+        *self.site = Site::Place(place.into());
     }
 
     /// Returns the first of several errors, with the next few as related errors; `Ok` if there are
@@ -149,7 +167,10 @@ impl SceneError {
 
     /// `file:line:column: message`, as far as they are known.
     pub fn headline(&self) -> String {
-        let place = self.place.as_deref().map_or(String::new(), |place| format!("{place}: "));
+        let place = match &*self.site {
+            Site::Place(place) => format!("{place}: "),
+            Site::Key(_) | Site::Unknown => String::new(),
+        };
         format!("{place}{}", self.message).replace('\n', " ")
     }
 

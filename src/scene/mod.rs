@@ -7,7 +7,8 @@
 
 pub mod error;
 pub mod expr;
-pub mod load;
+pub mod keys;
+mod load;
 pub mod parameters;
 pub mod presets;
 pub mod quantity;

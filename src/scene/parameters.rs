@@ -6,6 +6,10 @@ use super::quantity::Quantity;
 use super::scope::Scope;
 use super::types::{Parameter, Scene};
 
+/// Distance of a domain from zero, in its sizes, beyond which positions are computed relative to its
+/// corner. Nearer to zero, coordinates lose no more than three of their sixteen digits.
+const FAR: f64 = 1024.0;
+
 impl Scope {
     /// Evaluates the scene's parameters and checks their names and ranges. A parameter may use the
     /// parameters above it. Several errors are reported at once.
@@ -38,7 +42,20 @@ impl Scope {
             }
         }
         SceneError::join(errors)?;
+        scope.origin = scope.corner(scene);
         Ok(scope)
+    }
+
+    /// The lower left corner of a domain that is more than [`FAR`] times its size away from zero;
+    /// otherwise zero. Errors of the domain are reported when it is resolved.
+    fn corner(&self, scene: &Scene) -> [f64; 2] {
+        let range = |q: &[Quantity; 2]| Some([q[0].eval(self).ok()?, q[1].eval(self).ok()?]);
+        let (Some(x), Some(y)) = (range(&scene.domain.x), range(&scene.domain.y)) else {
+            return [0.0; 2];
+        };
+        let size = (x[1] - x[0]).max(y[1] - y[0]);
+        let far = [x, y].iter().flatten().any(|v| v.abs() > FAR * size);
+        if far && size > 0.0 { [x[0], y[0]] } else { [0.0; 2] }
     }
 
     fn parameter(

@@ -111,7 +111,9 @@ impl Value<true> {
         if expr.is_constant() {
             Ok(FieldFn::Constant(self.finite(expr.at(0.0, 0.0))?))
         } else {
-            Ok(FieldFn::Varying(expr))
+            let origin = scope.origin();
+            let far = origin != [0.0; 2];
+            Ok(if far { FieldFn::Shifted(expr, origin) } else { FieldFn::Varying(expr) })
         }
     }
 }
@@ -130,6 +132,8 @@ pub enum FieldFn {
     Constant(f64),
     /// An expression that depends on the position.
     Varying(Expr),
+    /// An expression of the position plus this origin (m).
+    Shifted(Expr, [f64; 2]),
 }
 
 impl FieldFn {
@@ -137,15 +141,16 @@ impl FieldFn {
     pub fn constant(&self) -> Option<f64> {
         match self {
             FieldFn::Constant(value) => Some(*value),
-            FieldFn::Varying(_) => None,
+            FieldFn::Varying(_) | FieldFn::Shifted(..) => None,
         }
     }
 
-    /// The value at a point (m); NaN or infinite where the expression is undefined.
+    /// The value at a point (m, relative to [`Scope::origin`]); NaN or infinite where the expression is undefined.
     pub fn at(&self, x: f64, y: f64) -> f64 {
         match self {
             FieldFn::Constant(value) => *value,
             FieldFn::Varying(expr) => expr.at(x, y),
+            FieldFn::Shifted(expr, [dx, dy]) => expr.at(x + dx, y + dy),
         }
     }
 }

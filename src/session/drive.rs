@@ -85,6 +85,13 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
     plan.warnings.iter().map(ToString::to_string).collect()
 }
 
+/// Warnings of a plan and of its initial state as text.
+pub fn warnings_at_start(plan: &Plan, run: &dyn Run) -> Vec<String> {
+    let mut all = warnings(plan);
+    all.extend(run.warnings().iter().map(ToString::to_string));
+    all
+}
+
 /// The warning that frames do not show every particle; `None` if they do.
 pub fn thinned(plan: &Plan, run: &dyn Run) -> Option<String> {
     let every = snapshot::thinning(plan, snapshot::drawn(plan, run.particles()).len());

@@ -100,11 +100,15 @@ impl Session {
             }
         }
         self.drive.tally.wall = self.wall();
-        for w in self.drive.run.warnings() {
+        for w in self.drive.run.warnings().iter().map(ToString::to_string) {
+            // Those of the initial state were told at the start.
+            if self.drive.tally.warnings.contains(&w) {
+                continue;
+            }
             if !self.quiet {
                 tell(format_args!("warning: {w}"));
             }
-            self.drive.tally.warnings.push(w.to_string());
+            self.drive.tally.warnings.push(w);
         }
         let ending = match &outcome {
             Ok(e) => *e,

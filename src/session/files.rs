@@ -95,7 +95,7 @@ impl Session {
             plan,
             run.as_ref(),
             (&folder, recording.as_deref()),
-            drive::warnings(plan),
+            drive::warnings_at_start(plan, run.as_ref()),
             &interrupted,
         )?;
         if !claimed.has_own_scene() {

@@ -39,6 +39,23 @@ pub fn watch_interrupts(exit_code: u8) -> Interrupted {
     interrupted
 }
 
+/// Makes a write beyond the size that the system allows for files (`ulimit -f`) an error of that
+/// write. By default the signal `SIGXFSZ` ends the program without a word.
+pub fn handle_file_size_limit() {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        /// `SIGXFSZ` on Linux, macOS and the BSDs.
+        const SIGXFSZ: i32 = 25;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        if let Ok(runtime) = runtime {
+            let _inside = runtime.enter();
+            // The handler remains when the runtime has ended. Without it, the default applies.
+            let _ = signal(SignalKind::from_raw(SIGXFSZ));
+        }
+    }
+}
+
 /// Waits for an interrupt.
 pub fn wait_for_interrupt(interrupted: &Interrupted) {
     while !interrupted.load(Ordering::SeqCst) {

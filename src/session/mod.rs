@@ -17,6 +17,8 @@ pub use drive::{Drive, snapshot_alone, thinned, warnings};
 pub use end::Ended;
 pub use error::SessionError;
 pub use files::{Budget, Session};
-pub use interrupts::{Interrupted, progress_bar, tell, wait_for_interrupt, watch_interrupts};
+pub use interrupts::{
+    Interrupted, handle_file_size_limit, progress_bar, tell, wait_for_interrupt, watch_interrupts,
+};
 pub use options::{Options, Recording, Safety};
 pub use timing::{Took, march, thread_seconds, timed};

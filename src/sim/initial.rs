@@ -32,11 +32,12 @@ pub struct Unfilled {
     pub y: f64,
 }
 
-/// The initial particles of a plan, sorted by cell.
+/// The initial particles of a plan, sorted by cell, and the indices of the regions that contain
+/// none although no later region covers them.
 ///
 /// # Errors
 /// A particle lies in no region, and there is no background material.
-pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
+pub fn particles(plan: &Plan) -> Result<(Particles, Vec<usize>), Unfilled> {
     let effects = &plan.effects;
     let mut out = Particles {
         director: effects.directors.then(Vec::new),
@@ -49,6 +50,7 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
     let places = places(plan);
     let start: f64 = plan.method.seeding.random(usize::MAX).random();
     let mut members = Vec::new();
+    let mut empty = vec![true; plan.regions.len()];
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let places = &places.position[places.of_cell(cell)];
         let mut random = plan.method.seeding.random(cell);
@@ -72,6 +74,7 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
             out.push(position, member.share * mesh.cell_volume(cell), member.material);
             let last = out.len() - 1;
             let si = plan.si(position);
+            member.filling.iter().for_each(|&f| empty[f] = false);
             let region = member.filling.map(|f| &plan.regions[f]);
             if let (Some(column), Some(d)) =
                 (&mut out.director, region.and_then(|r| r.director.as_ref()))
@@ -89,7 +92,10 @@ pub fn particles(plan: &Plan) -> Result<Particles, Unfilled> {
         carry(plan, cell, &members, (&mut out, first));
     }
     out.sort(mesh);
-    Ok(out)
+    let covers =
+        |k: usize| out.position.iter().any(|&p| plan.regions[k].shape.contains(plan.si(p)));
+    let empty = (0..empty.len()).filter(|&k| empty[k] && !covers(k)).collect();
+    Ok((out, empty))
 }
 
 /// Initial positions of the particles, sorted by cell; the number in each cell is within its

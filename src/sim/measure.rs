@@ -208,6 +208,7 @@ impl<const D: usize> Simulation<D> {
         gauges.clear();
         gauges.extend(self.gauges.iter().map(|g| GaugeRow {
             volume: g.volume * u.area(),
+            refilled: g.refilled * u.area(),
             rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
                 * u.area_rate(),
         }));

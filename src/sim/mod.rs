@@ -20,6 +20,7 @@ pub mod guard;
 pub mod initial;
 mod interest;
 mod measure;
+mod notes;
 pub mod phases;
 pub mod row;
 mod run;
@@ -33,6 +34,7 @@ mod step;
 
 pub use error::SimError;
 pub use fault::{Fault, Place};
+pub use notes::empty_regions;
 pub use run::{Run, pressure_at, velocity_at};
 pub use simulation::Simulation;
 
@@ -98,7 +100,7 @@ impl<const D: usize> Run for Simulation<D> {
         self.count
     }
     fn warnings(&self) -> Vec<Warning> {
-        let mut list = Vec::new();
+        let mut list = self.notes.clone();
         if self.count.healed > 0 {
             list.push(Warning::CellsHealed { count: self.count.healed });
         }

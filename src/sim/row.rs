@@ -398,16 +398,19 @@ columns! {
 }
 
 /// Values of a gauge.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct GaugeRow {
     /// Net volume of the gauge's material that has crossed it per unit depth, m2.
     pub volume: f64,
     /// Flux of the gauge's material across it, m2/s.
     pub rate: f64,
+    /// Net volume of the gauge's material that the refilling of empty cells has carried across it,
+    /// m2. It is not part of `volume`.
+    pub refilled: f64,
 }
 
 /// Columns of each gauge. If there are several gauges, the gauge's name is a prefix.
-pub static PER_GAUGE: [Column; 2] = [
+pub static PER_GAUGE: [Column; 3] = [
     Column {
         name: "outflow_volume",
         symbol: "V",
@@ -439,6 +442,20 @@ pub static PER_GAUGE: [Column; 2] = [
             number: |r, k| r.gauges[k].rate,
             text: |r, k, f| r.gauges[k].rate.text(f),
             set: |r, k, t| put(&mut r.gauges[k].rate, t),
+        },
+        ..Column::PLAIN
+    },
+    Column {
+        name: "outflow_refilled",
+        unit: "m²",
+        label: "refilled volume",
+        meaning: "Net volume of the gauge's material that the refilling of empty cells has carried \
+                  across it. It is not counted in outflow_volume.",
+        path: "refilled",
+        access: Access {
+            number: |r, k| r.gauges[k].refilled,
+            text: |r, k, f| r.gauges[k].refilled.text(f),
+            set: |r, k, t| put(&mut r.gauges[k].refilled, t),
         },
         ..Column::PLAIN
     },

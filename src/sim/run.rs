@@ -79,7 +79,7 @@ pub trait Run: Send {
 /// Velocity and rotation (zero if none is solved) of a flow, m/s and 1/s, at an SI point.
 pub fn velocity_at<const D: usize>(plan: &Plan, flow: &Flow<D>, p: [f64; 2]) -> [f64; 3] {
     let u = &plan.units;
-    let v = flow.at(&plan.mesh, p.map(|c| c / u.length));
+    let v = flow.at(&plan.mesh, plan.internal(p));
     let w = if D == 3 { v[D - 1] * u.rate() } else { 0.0 };
     [v[0] * u.velocity(), v[1] * u.velocity(), w]
 }
@@ -87,5 +87,5 @@ pub fn velocity_at<const D: usize>(plan: &Plan, flow: &Flow<D>, p: [f64; 2]) -> 
 /// Pressure of a flow, Pa, at an SI point.
 pub fn pressure_at<const D: usize>(plan: &Plan, flow: &Flow<D>, p: [f64; 2]) -> f64 {
     let u = &plan.units;
-    flow.pressure_at(&plan.mesh, p.map(|c| c / u.length)) * u.stress()
+    flow.pressure_at(&plan.mesh, plan.internal(p)) * u.stress()
 }

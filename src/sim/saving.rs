@@ -110,6 +110,7 @@ fn save_row(row: &Row, s: &mut State) {
         s.put_floats(column.saved, [column.number(row)]);
     }
     s.put_floats("row.gauges", row.gauges.iter().flat_map(|g| [g.volume, g.rate]));
+    s.put_floats("row.refilled", row.gauges.iter().map(|g| g.refilled));
     s.put_floats("row.drift", row.drift.iter().copied());
     save_phases("row.seconds", &row.seconds, s);
 }
@@ -151,7 +152,10 @@ fn load_row(s: &State, gauges: usize, materials: usize) -> Result<Row, StateErro
     });
     row.mean_alignment = s.floats("row.alignment")?.first().copied();
     let tuples = s.tuples("row.gauges", gauges)?;
-    row.gauges = tuples.into_iter().map(|[volume, rate]| GaugeRow { volume, rate }).collect();
+    let refilled = s.exactly("row.refilled", gauges)?;
+    let gauges = tuples.into_iter().zip(refilled);
+    row.gauges =
+        gauges.map(|([volume, rate], &refilled)| GaugeRow { volume, rate, refilled }).collect();
     row.drift = s.exactly("row.drift", materials)?.to_vec();
     row.seconds = load_phases("row.seconds", s)?;
     Ok(row)
@@ -175,6 +179,7 @@ impl<const D: usize> Simulation<D> {
         // points.
         s.put_floats("quadrature.factors", self.factors_of_points.iter().copied());
         s.put_floats("gauges", self.gauges.iter().map(|g| g.volume));
+        s.put_floats("gauges.refilled", self.gauges.iter().map(|g| g.refilled));
         if let Some(dye) = &self.dye {
             s.put_floats("dye.points", dye.lines.iter().flatten().flatten().copied());
             s.put_counts("dye.lines", dye.lines.iter().map(|l| l.len() as u64));
@@ -214,6 +219,7 @@ impl<const D: usize> Simulation<D> {
         };
         let factors = s.exactly("quadrature.factors", materials)?;
         let gauges = s.exactly("gauges", self.gauges.len())?;
+        let refilled = s.exactly("gauges.refilled", self.gauges.len())?;
         let dye = self.dye.as_ref().map(|_| dye_lines(s)).transpose()?;
         let [splits, merges, held, left, healed] = s.tally("count")?;
         let [step, version, next_change] = s.tally("progress")?;
@@ -243,8 +249,8 @@ impl<const D: usize> Simulation<D> {
         self.particles = particles;
         self.flow = flow;
         self.previous = previous;
-        for (gauge, &volume) in self.gauges.iter_mut().zip(gauges) {
-            gauge.volume = volume;
+        for ((gauge, &volume), &refilled) in self.gauges.iter_mut().zip(gauges).zip(refilled) {
+            (gauge.volume, gauge.refilled) = (volume, refilled);
         }
         if let (Some(dye), Some(lines)) = (&mut self.dye, dye) {
             dye.lines = lines;

@@ -10,7 +10,7 @@ use crate::motion::advect::Displacements;
 use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
 use crate::motion::tracers::DyeLines;
-use crate::plan::{Matter, Plan};
+use crate::plan::{Matter, Plan, Warning};
 use crate::scene::Quadrature as Rule;
 use crate::solve::density::Density;
 use crate::solve::quadrature::Quadrature;
@@ -85,6 +85,8 @@ pub struct Simulation<const D: usize> {
     pub(super) row: Row,
     pub(super) report: Report,
     pub(super) events: Vec<String>,
+    /// Warnings about the initial state.
+    pub(super) notes: Vec<Warning>,
     /// Largest step, s; see [`Run::limit_step`](super::Run::limit_step).
     pub(super) longest: Option<f64>,
     /// Length of the current or last step, in the plan's units.
@@ -113,7 +115,7 @@ impl<const D: usize> Simulation<D> {
         let stokes = Stokes::new(mesh.clone(), constraints);
         let population =
             Population::new(&mesh, &plan.enclosure, plan.method.seeding, plan.background());
-        let particles = initial::particles(&plan)?;
+        let (particles, empty) = initial::particles(&plan)?;
         let fixed_load = plan.fixed_loads::<D>();
         let mut sim = Simulation {
             quadrature,
@@ -160,6 +162,7 @@ impl<const D: usize> Simulation<D> {
             row: Row::empty(plan.state.materials.len()),
             report: Report::default(),
             events: vec![],
+            notes: vec![],
             longest: None,
             attempted: 0.0,
             factors_of_points: vec![],
@@ -171,6 +174,7 @@ impl<const D: usize> Simulation<D> {
         let mut seconds = Phases::default();
         sim.solve(None, &mut seconds)?;
         sim.baseline = (0..sim.matter.materials.len()).map(|m| sim.projected_share(m)).collect();
+        sim.notes = sim.initial_notes(empty);
         sim.measure(0.0, Limiter::Start, seconds, sim.report.corrections, clock);
         Ok(sim)
     }

@@ -99,6 +99,9 @@ impl<const D: usize> Simulation<D> {
         seconds.motion += phase.elapsed().as_secs_f64() - seconds.dye;
         let phase = Instant::now();
         self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
+        for refill in &self.population.refills {
+            self.gauges.iter_mut().for_each(|g| g.refill(&plan.mesh, refill));
+        }
         seconds.population += phase.elapsed().as_secs_f64();
 
         self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };

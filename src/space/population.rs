@@ -60,6 +60,17 @@ pub struct Count {
     pub healed: u64,
 }
 
+/// Volume that was moved into an empty cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Refill {
+    /// The cell that gave it and the cell that received it; they share a face.
+    pub cells: [usize; 2],
+    /// Its material.
+    pub material: u8,
+    /// Its volume per depth, in the plan's units.
+    pub volume: f64,
+}
+
 /// Resampling that keeps the number of particles per cell within bounds.
 #[derive(Clone, Debug)]
 pub struct Population {
@@ -68,6 +79,8 @@ pub struct Population {
     background: Option<u8>,
     neighbours: Neighbours,
     room: Room,
+    /// Volumes that the last call of [`Population::control`] has moved between cells.
+    pub refills: Vec<Refill>,
 }
 
 /// Particles that a cell needs.
@@ -102,12 +115,13 @@ impl Population {
     ) -> Self {
         let room = Room { lacking: vec![false; mesh.cells()], ..Room::default() };
         let neighbours = Neighbours::new(mesh, enclosure);
-        Population { seeding, background, neighbours, room }
+        Population { seeding, background, neighbours, room, refills: vec![] }
     }
 
     /// Restores the bounds and counts the events. `particles` must be sorted, and are sorted on
     /// return.
     pub fn control(&mut self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {
+        self.refills.clear();
         self.merge(mesh, particles, count);
         self.split(mesh, particles, count);
     }
@@ -157,12 +171,13 @@ impl Population {
 
     /// Refills empty cells that have a neighbour with particles; returns whether there were any.
     /// Cells whose neighbours are all empty are refilled in later calls.
-    fn heal_all(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) -> bool {
+    fn heal_all(&mut self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) -> bool {
         let before = particles.len();
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
             if particles.of_cell(cell).is_empty() {
-                let filled = self.heal(mesh, particles, cell);
-                count.healed += u64::from(filled.is_some_and(|m| Some(m) != self.background));
+                let Some(refill) = self.heal(mesh, particles, cell) else { continue };
+                count.healed += u64::from(Some(refill.material) != self.background);
+                self.refills.push(refill);
             }
         }
         let any = particles.len() != before;
@@ -226,20 +241,23 @@ impl Population {
         )
     }
 
-    /// Refills an empty cell with half of the largest particle of its neighbours; returns its
-    /// material if there was one.
-    fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> Option<u8> {
+    /// Refills an empty cell with half of the largest particle of its neighbours, if there is one.
+    fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> Option<Refill> {
         let donor = cheapest(
-            self.neighbours
-                .of(cell)
-                .flat_map(|n| particles.of_cell(n))
-                .map(|p| (-particles.volume[p], from_middle(mesh, particles.position[p]), p)),
+            self.neighbours.of(cell).flat_map(|n| particles.of_cell(n).map(move |p| (n, p))).map(
+                |(n, p)| {
+                    let middle = from_middle(mesh, particles.position[p]);
+                    (-particles.volume[p], middle, (n, p))
+                },
+            ),
         )?;
+        let (from, donor) = donor;
         particles.volume[donor] *= 0.5;
         particles.duplicate(donor);
         let child = particles.len() - 1;
         particles.position[child] = mesh.cell_centre(cell);
-        Some(particles.material[child])
+        let (material, volume) = (particles.material[child], particles.volume[child]);
+        Some(Refill { cells: [from, cell], material, volume })
     }
 
     fn merge(&self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) {

@@ -76,6 +76,106 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
     }
 }
 
+/// What leaves the part above a gauge is what the gauge counts, including what the refilling of
+/// empty cells carries across it.
+#[test]
+fn the_loss_above_a_gauge_is_counted_to_rounding() {
+    let mut refilled = 0.0;
+    for particles in ["1", "4", "16"] {
+        let mut run = preset(
+            "silo",
+            &[
+                "accuracy.cells=4",
+                &format!("accuracy.particles_per_cell={particles}"),
+                "time.end=1.2e-3",
+                "recording.times=[]",
+            ],
+        );
+        let above = |run: &dyn Run| -> f64 {
+            let p = run.particles();
+            let plan = run.plan();
+            let held = (0..p.len()).filter(|&k| {
+                let m = &plan.state.materials[usize::from(p.material[k])];
+                m.name == "grains" && plan.si(p.position[k])[1] >= 3.0
+            });
+            held.map(|k| p.volume[k]).sum::<f64>() * plan.units.area()
+        };
+        let first = above(run.as_ref());
+        finish(run.as_mut(), |run| {
+            let gauge = run.row().gauges[0];
+            let lost = first - above(run);
+            let counted = gauge.volume + gauge.refilled;
+            assert!((lost - counted).abs() < 1e-12 * first, "{particles}: {lost} {counted}");
+        });
+        refilled += run.row().gauges[0].refilled.abs();
+    }
+    assert!(refilled > 0.0, "no refill crossed the gauge");
+}
+
+/// A scene far from zero is computed relative to its corner.
+#[test]
+fn a_scene_may_be_anywhere() {
+    let box_at = |x: f64, y: f64| {
+        let text = format!(
+            "schema = 1\nname = \"box\"\ngravity = [0, -10]\n[parameters]\n\
+             x0 = {{ default = {x} }}\ny0 = {{ default = {y} }}\n[domain]\n\
+             x = [\"x0\", \"x0 + 1\"]\ny = [\"y0\", \"y0 + 1\"]\n[accuracy]\ncells = 8\n\
+             [time]\nend = 0.4\n[boundaries]\nbottom.kind = \"no_slip\"\n\
+             left.velocity_y = \"0.1*(y - y0)*(y0 + 1 - y)\"\n\
+             [materials.heavy]\ndensity = 100\nshear_viscosity = 50\n\
+             [materials.light]\nshear_viscosity = 1\n\
+             [[regions]]\nmaterial = \"light\"\n[[regions]]\nmaterial = \"heavy\"\n\
+             shape.rectangle = {{ x = [\"x0\", \"x0 + 0.5\"], y = [\"y0 + 0.25\", \"y0 + 0.75\"] }}\n\
+             [[regions]]\nmaterial = \"heavy\"\n\
+             shape.circle = {{ centre = [\"x0 + 0.75\", \"y0 + 0.75\"], radius = 0.125 }}\n\
+             [[gauges]]\nname = \"g\"\nfrom = [\"x0\", \"y0 + 0.5\"]\nto = [\"x0 + 0.5\", \"y0 + 0.5\"]\n\
+             direction = \"down\"\nmaterial = \"heavy\"\n\
+             [dye]\nlines = [[[\"x0\", \"y0 + 0.25\"], [\"x0 + 1\", \"y0 + 0.25\"]]]\n"
+        );
+        let mut run = scene(&text, &[]);
+        finish(run.as_mut(), |_| {});
+        run
+    };
+    let near = box_at(0.0, 0.0);
+    assert!(near.row().gauges[0].volume > 0.0);
+    // Steps of coordinates are powers of two there, so that all given points are exact.
+    let far = box_at(2f64.powi(40), -2f64.powi(41));
+    assert_eq!(near.state_hash(), far.state_hash());
+    let told = |run: &dyn Run| {
+        let list = run.plan().warnings.iter().map(ToString::to_string);
+        list.filter(|w| w.contains("relative to its lower left corner")).count()
+    };
+    assert_eq!((told(near.as_ref()), told(far.as_ref())), (0, 1));
+    let [x, y] = [2f64.powi(40) + 0.25, -2f64.powi(41) + 0.5];
+    assert_eq!(near.velocity_at([0.25, 0.5]), far.velocity_at([x, y]));
+}
+
+#[test]
+fn regions_without_particles_and_equilibria_upside_down_are_told() {
+    let layers = |upper: f64, lower: f64, more: &str| {
+        let text = format!(
+            "schema = 1\nname = \"box\"\ngravity = [0, -10]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
+             [accuracy]\ncells = 8\n[time]\nend = 1\n[materials.upper]\ndensity = {upper}\n\
+             shear_viscosity = 1\n[materials.lower]\ndensity = {lower}\nshear_viscosity = 1\n\
+             [[regions]]\nmaterial = \"upper\"\n[[regions]]\nmaterial = \"lower\"\n\
+             shape.rectangle = {{ x = [0, 1], y = [0, 0.53] }}\n{more}"
+        );
+        let run = scene(&text, &[]);
+        run.warnings().iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    };
+    assert_eq!(layers(1.0, 2.0, ""), "");
+    assert!(layers(2.0, 1.0, "").contains("exact equilibrium"));
+    let wave = "[[regions]]\nmaterial = \"lower\"\nshape.where = \"y < 0.55 + 0.01*cos(pi*x)\"\n";
+    assert_eq!(layers(2.0, 1.0, wave), "");
+    for tiny in ["radius = 1e-4", "radius = 1e-12"] {
+        let speck = format!(
+            "[[regions]]\nmaterial = \"upper\"\nshape.circle = {{ centre = [0.301, 0.203], {tiny} }}\n"
+        );
+        let told = layers(1.0, 2.0, &speck);
+        assert!(told.contains("regions[2] holds no particle"), "{tiny}: {told}");
+    }
+}
+
 #[test]
 fn a_symmetric_silo_stays_symmetric() {
     let mut run = preset("silo", &["accuracy.cells=4", "time.end=3e-4", "recording.times=[]"]);

@@ -44,6 +44,7 @@ pub(super) fn solve(
     interrupted: &Interrupted,
 ) -> Result<(), Failure> {
     let plan = Arc::new(case.plan(source)?);
+    super::super::memory::afford(&plan)?;
     let recording = if recorded { Recording::Folder } else { Recording::None };
     let options = Options { quiet: true, recording, ..Options::default() };
     let claim = || Ok::<_, Failure>(RunFolder::claim(folder)?);

@@ -8,6 +8,7 @@ use super::super::protocol::{Answer, Mode, PinState};
 use super::super::save;
 use super::super::stage::{MOST_PINS, Pin};
 use super::*;
+use crate::plan::memory::{self, TooLarge};
 use crate::scene::{SceneError, SceneSource};
 
 impl Session {
@@ -59,6 +60,10 @@ impl Session {
         plan: crate::plan::Plan,
         mode: Mode,
     ) -> Result<(), SceneError> {
+        memory::afford(&plan).map_err(|e| {
+            self.problem = Some(Problem::of_machine(e.to_string()));
+            SceneError::of_key("accuracy.cells", e.to_string(), TooLarge::REMEDY)
+        })?;
         let id = self.number();
         let live = Live::start(id, draft, plan, &self.status).map_err(|e| {
             self.problem = Some(Problem::of_run(&e));

@@ -5,32 +5,39 @@ use crate::plan::Method;
 use crate::scene::{Scene, SceneError};
 use crate::space::seeding::Seeding;
 
+/// Largest number of corrections of a solution.
+const MOST_CORRECTIONS: u32 = 10_000;
+
 /// Settings of the numerical method.
 pub(super) fn method(scene: &Scene) -> Result<Method> {
     let a = &scene.accuracy;
     let side = f64::from(a.particles_per_cell).sqrt().round() as usize;
     if side == 0 || side * side != a.particles_per_cell as usize || side > 32 {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "accuracy.particles_per_cell",
             format!("accuracy.particles_per_cell is {}", a.particles_per_cell),
             "give a square number from 1 to 1024: 9, 16, 25, ...",
         ));
     }
     if !(a.tolerance >= 1e-14 && a.tolerance <= 1e-2) {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "accuracy.tolerance",
             format!("accuracy.tolerance is {}", a.tolerance),
             "give 1e-14 to 1e-2; 1e-12 is the limit of double precision in stiff scenes",
         ));
     }
     if !(0.0..=2.0).contains(&a.stabilisation) {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "accuracy.stabilisation",
             format!("accuracy.stabilisation is {}", a.stabilisation),
             "give a fraction of a step, 0.6 to 1, or 0 to switch it off; 0.75 is usual",
         ));
     }
-    if a.max_corrections == 0 {
-        return Err(SceneError::new(
-            "accuracy.max_corrections is 0",
-            "give 1 or more; 40 is usual",
+    if !(1..=MOST_CORRECTIONS).contains(&a.max_corrections) {
+        return Err(SceneError::of_key(
+            "accuracy.max_corrections",
+            format!("accuracy.max_corrections is {}", a.max_corrections),
+            format!("give 1 to {MOST_CORRECTIONS}; 40 is usual"),
         ));
     }
     Ok(Method {

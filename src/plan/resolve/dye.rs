@@ -1,8 +1,15 @@
 //! This module resolves `[dye]`, the passive lines and the marked particles.
 
-use super::values::{Result, pair, positive};
+use super::values::{Result, point, positive, ranges};
 use crate::plan::{Mark, Tracers, Units};
 use crate::scene::{Scene, SceneError, Scope};
+
+/// Largest number of points of all lines.
+const MOST_POINTS: f64 = 4e6;
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (b[0] - a[0]).hypot(b[1] - a[1])
+}
 
 /// The passive lines, and the segments whose particles are marked.
 pub(super) fn dye(
@@ -15,20 +22,32 @@ pub(super) fn dye(
     let l = units.length;
     let spacing = length / f64::from(scene.accuracy.cells) / l * 0.5;
     let mut lines = Vec::new();
-    let mut add = |points: &[[f64; 2]]| {
+    let mut count = 0.0;
+    let mut add = |points: &[[f64; 2]], key: &str| -> Result<()> {
+        let length: f64 = points.windows(2).map(|p| distance(p[0], p[1]) / l).sum();
+        count += length / spacing + points.len() as f64;
+        if count > MOST_POINTS {
+            return Err(SceneError::of_key(
+                key,
+                format!("the lines of dye would have more than {MOST_POINTS:.0} points"),
+                "they have two points per cell: give fewer or shorter lines, or lower \
+                 accuracy.cells",
+            ));
+        }
         let mut line: Vec<[f64; 2]> = vec![points[0].map(|v| v / l)];
         for pair in points.windows(2) {
             let [a, b] = [pair[0], pair[1]].map(|p| p.map(|v| v / l));
-            let n = ((b[0] - a[0]).hypot(b[1] - a[1]) / spacing).ceil().clamp(1.0, 1e5) as usize;
+            let n = (distance(a, b) / spacing).ceil().max(1.0) as usize;
             line.extend((1..=n).map(|k| {
                 let t = k as f64 / n as f64;
                 [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]
             }));
         }
         lines.push(line);
+        Ok(())
     };
     if let Some(g) = &dye.grid {
-        let (x, y) = (pair(&g.x, scope)?, pair(&g.y, scope)?);
+        let [x, y] = ranges(&g.x, &g.y, scope)?;
         let step = positive(&g.spacing, scope, "dye.grid.spacing")?;
         let counts = [x, y].map(|[a, b]| ((b - a) / step + 1e-9).floor());
         if counts.iter().any(|&n| n > 1000.0) {
@@ -40,30 +59,31 @@ pub(super) fn dye(
         }
         for i in 0..=counts[0].max(-1.0) as i64 {
             let at = x[0] + step * i as f64;
-            add(&[[at, y[0]], [at, y[1]]]);
+            add(&[[at, y[0]], [at, y[1]]], "dye.grid")?;
         }
         for j in 0..=counts[1].max(-1.0) as i64 {
             let at = y[0] + step * j as f64;
-            add(&[[x[0], at], [x[1], at]]);
+            add(&[[x[0], at], [x[1], at]], "dye.grid")?;
         }
     }
     for line in &dye.lines {
-        let points = line.iter().map(|p| pair(p, scope)).collect::<Result<Vec<_>>>()?;
+        let points = line.iter().map(|p| point(p, scope)).collect::<Result<Vec<_>>>()?;
         if points.len() < 2 {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                "dye.lines",
                 "a dye line has fewer than two points",
                 "give two or more",
             ));
         }
-        add(&points);
+        add(&points, "dye.lines")?;
     }
     let marks = dye
         .marks
         .iter()
         .map(|m| {
             Ok(Mark {
-                from: pair(&m.from, scope)?.map(|v| v / l),
-                to: pair(&m.to, scope)?.map(|v| v / l),
+                from: point(&m.from, scope)?.map(|v| v / l),
+                to: point(&m.to, scope)?.map(|v| v / l),
                 half_width: 0.5 * positive(&m.width, scope, "the width of a mark")? / l,
             })
         })

@@ -33,7 +33,7 @@ impl SiGauge {
 
 pub(super) fn gauges(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Vec<SiGauge>> {
     let mut list: Vec<SiGauge> = Vec::new();
-    for g in &scene.gauges {
+    for (k, g) in scene.gauges.iter().enumerate() {
         let what = format!("gauge `{}`", g.name);
         let segment = axis_segment(&what, &g.from, &g.to, scope, domain)?;
         let wanted = usize::from(matches!(g.direction, Direction::Up | Direction::Down));
@@ -45,12 +45,14 @@ pub(super) fn gauges(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Res
             ));
         }
         if list.iter().any(|o| o.name == g.name) {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                format!("gauges[{k}].name"),
                 format!("two gauges are named `{}`", g.name),
                 "rename one",
             ));
         }
-        let material = material_index(&scene.materials, &g.material, &what)?;
+        let material =
+            material_index(&scene.materials, &g.material, &what, &format!("gauges[{k}].material"))?;
         list.push(SiGauge { name: g.name.clone(), segment, direction: g.direction, material });
     }
     Ok(list)
@@ -59,7 +61,9 @@ pub(super) fn gauges(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Res
 /// Checks that the scene has the quantity named in `[interest]`.
 pub(super) fn interest(scene: &Scene) -> Result<()> {
     let Some(i) = &scene.interest else { return Ok(()) };
-    let fault = |what: String, help: &str| Err(SceneError::new(format!("interest: {what}"), help));
+    let fault = |what: String, help: &str| {
+        Err(SceneError::of_key("interest", format!("interest: {what}"), help))
+    };
     if let Interesting::Gauge(name) | Interesting::Rate(name) = &i.quantity
         && !scene.gauges.iter().any(|g| g.name == *name)
     {

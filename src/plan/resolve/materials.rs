@@ -1,6 +1,6 @@
 //! This module resolves the `[materials]` tables and gravity into checked values in SI units.
 
-use super::values::{Result, finite_range, not_negative, pair, positive};
+use super::values::{Result, finite_range, not_negative, positive, ranges};
 use crate::laws::cosserat::{self, Cosserat};
 use crate::laws::{Law, Shear, granular};
 use crate::plan::material::Material;
@@ -49,9 +49,10 @@ pub(super) struct SiMaterial {
 impl SiMatter {
     pub(super) fn new(scene: &Scene, scope: &Scope) -> Result<SiMatter> {
         let gravity = [scene.gravity[0].eval(scope)?, scene.gravity[1].eval(scope)?];
-        let (x, y) = (pair(&scene.domain.x, scope)?, pair(&scene.domain.y, scope)?);
+        let [x, y] = ranges(&scene.domain.x, &scene.domain.y, scope)?;
         if scene.materials.is_empty() || scene.materials.len() > MAX_MATERIALS {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                "materials",
                 format!("the scene has {} materials", scene.materials.len()),
                 format!("give 1 to {MAX_MATERIALS} [materials.<name>] tables"),
             ));
@@ -69,7 +70,8 @@ impl SiMatter {
         let backgrounds: Vec<_> =
             materials.iter().filter(|m| m.background).map(|m| m.name.as_str()).collect();
         if backgrounds.len() > 1 {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                format!("materials.{}.background", backgrounds[1]),
                 format!("more than one background material: {}", backgrounds.join(", ")),
                 "set `background = true` on one of them only",
             ));
@@ -168,7 +170,8 @@ impl SiMaterial {
                 ));
             }
             (None, None) => {
-                return Err(SceneError::new(
+                return Err(SceneError::of_key(
+                    format!("materials.{name}"),
                     format!("material `{name}` has no viscosity"),
                     "give shear_viscosity = <Pa s>, or a granular table",
                 ));
@@ -240,7 +243,8 @@ impl SiMaterial {
                 || out.rotation.is_some()
                 || out.compliance > 0.0)
         {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                format!("materials.{name}"),
                 format!("the background `{name}` carries a history"),
                 "a background has no history: constant density and viscosity, incompressible, no \
                  layers, no internal length; else set background = false",
@@ -254,12 +258,14 @@ pub(super) fn material_index<'a>(
     materials: &'a IndexMap<String, scene::Material>,
     name: &str,
     user: &str,
+    key: &str,
 ) -> Result<u8> {
     materials.get_index_of(name).map(|i| i as u8).ok_or_else(|| {
         let known: Vec<&'a str> = materials.keys().map(String::as_str).collect();
         let guess = closest(name, known.iter().copied())
             .map_or(String::new(), |g| format!("did you mean `{g}`? "));
-        SceneError::new(
+        SceneError::of_key(
+            key,
             format!("{user} names the material `{name}`, which does not exist"),
             format!("{guess}materials: {}", known.join(", ")),
         )

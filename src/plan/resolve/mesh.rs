@@ -1,7 +1,7 @@
 //! This module resolves `[domain]`, `[mesh]` and `accuracy.cells` into the mesh.
 
 use super::gauges::SiGauge;
-use super::values::Result;
+use super::values::{Result, coordinate};
 use super::walls::Walls;
 use crate::plan::Units;
 use crate::plan::boundary::SIDES;
@@ -25,7 +25,8 @@ pub(super) fn mesh(
     units: &Units,
 ) -> Result<Mesh> {
     if scene.accuracy.cells == 0 {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "accuracy.cells",
             "accuracy.cells is 0",
             "give 1 or more cells per length_scale",
         ));
@@ -33,7 +34,8 @@ pub(super) fn mesh(
     let size = length / f64::from(scene.accuracy.cells);
     let growth = scene.mesh.growth;
     if !(growth > 1.0 && growth <= 2.0) {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "mesh.growth",
             format!("mesh.growth is {growth}"),
             "neighbouring cells may differ by a ratio above 1, at most 2; 1.5 is usual",
         ));
@@ -61,7 +63,7 @@ pub(super) fn mesh(
     }
     for (c, list) in [&scene.mesh.lines_x, &scene.mesh.lines_y].into_iter().enumerate() {
         for q in list {
-            let v = q.eval(scope)?;
+            let v = coordinate(q, c, scope)?;
             if v < domain[c][0] || v > domain[c][1] {
                 return Err(SceneError::at(
                     q,
@@ -79,14 +81,16 @@ pub(super) fn mesh(
         let sizing = Sizing { size, refinements: refinements[c].clone(), growth };
         let estimate = (domain[c][1] - domain[c][0]) / size;
         if estimate > MAX_CELLS as f64 {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                "accuracy.cells",
                 format!("the mesh would have {estimate:.0} cells along {}", ["x", "y"][c]),
                 format!("lower accuracy.cells; at most {MAX_CELLS} cells per side are allowed"),
             ));
         }
         let out = sizing.lines(demanded).map_err(|e| {
             let gap = e.second.at - e.first.at;
-            SceneError::new(
+            SceneError::of_key(
+                "accuracy.cells",
                 format!(
                     "{} at {} = {:.6} and {} at {:.6} are closer than a cell ({:.3e} < {:.3e} m)",
                     e.first.owner,
@@ -104,7 +108,8 @@ pub(super) fn mesh(
             )
         })?;
         if out.len() - 1 > MAX_CELLS {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                "accuracy.cells",
                 format!("the mesh would have {} cells along {}", out.len() - 1, ["x", "y"][c]),
                 format!(
                     "lower accuracy.cells or the grading (mesh.grading = [] for none); at most {MAX_CELLS}"
@@ -113,7 +118,8 @@ pub(super) fn mesh(
         }
         // A periodic axis needs two cells, or a node would be its own neighbour.
         if periodic[c] && out.len() < 3 {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                "accuracy.cells",
                 format!("a periodic domain one cell wide along {}", ["x", "y"][c]),
                 "raise accuracy.cells so that it has at least two",
             ));
@@ -124,7 +130,8 @@ pub(super) fn mesh(
     let x = axes.pop();
     let (Some(x), Some(y)) = (x, y) else { unreachable!("two axes were made") };
     if x.cells() * y.cells() > MAX_TOTAL_CELLS {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "accuracy.cells",
             format!("the mesh would have {} x {} cells", x.cells(), y.cells()),
             format!(
                 "lower accuracy.cells or the grading (mesh.grading = [] for none): at most \
@@ -139,7 +146,11 @@ pub(super) fn mesh(
             walls.blocks.iter().any(|([x, y], _)| px > x[0] && px < x[1] && py > y[0] && py < y[1]);
     }
     if mesh.solid.iter().all(|&s| s) {
-        return Err(SceneError::new("blocks fill the whole domain", "leave space for a material"));
+        return Err(SceneError::of_key(
+            "blocks",
+            "blocks fill the whole domain",
+            "leave space for a material",
+        ));
     }
     Ok(mesh)
 }
@@ -201,8 +212,8 @@ fn refinements(
                     out[w.segment.normal].push(Refinement { at: w.segment.at, factor });
                 }
             }
-            GradingTarget::X(q) => out[0].push(Refinement { at: q.eval(scope)?, factor }),
-            GradingTarget::Y(q) => out[1].push(Refinement { at: q.eval(scope)?, factor }),
+            GradingTarget::X(q) => out[0].push(Refinement { at: coordinate(q, 0, scope)?, factor }),
+            GradingTarget::Y(q) => out[1].push(Refinement { at: coordinate(q, 1, scope)?, factor }),
         }
     }
     Ok(out)
@@ -214,7 +225,8 @@ fn periodic(scene: &Scene) -> Result<[bool; 2]> {
     for (c, (low, high)) in [(&b.left, &b.right), (&b.bottom, &b.top)].into_iter().enumerate() {
         let kinds = [low.kind, high.kind].map(|k| k == BoundaryKind::Periodic);
         if kinds[0] != kinds[1] {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                format!("boundaries.{}.kind", SIDES[2 * c + usize::from(kinds[1])]),
                 format!(
                     "only one of boundaries.{} and boundaries.{} is periodic",
                     SIDES[2 * c],

@@ -24,20 +24,21 @@ use crate::space::shape::side_normal;
 use materials::{SiMatter, thin_fluid};
 use regions::{placed, regions};
 use std::sync::Arc;
-use values::{Result, finite_range, middle, pair, positive};
+use values::{Result, finite_range, middle, positive, ranges};
 use walls::Walls;
 
 /// Resolves a scene as if its schedule were empty.
 fn without_schedule(scene: &Scene) -> Result<Plan> {
     let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if scene.name.is_empty() || scene.name.len() > 100 || !scene.name.chars().all(ordinary) {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "name",
             format!("the scene's name is {:?}", scene.name),
             "it names folders: use 1 to 100 letters, digits, `_` and `-`",
         ));
     }
     let scope = &Scope::new(scene)?;
-    let (x, y) = (pair(&scene.domain.x, scope)?, pair(&scene.domain.y, scope)?);
+    let [x, y] = ranges(&scene.domain.x, &scene.domain.y, scope)?;
     for (name, range, q) in [("x", x, &scene.domain.x), ("y", y, &scene.domain.y)] {
         if range[1] <= range[0] {
             return Err(SceneError::at(
@@ -54,6 +55,10 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     };
     // All materials and regions are checked, including those that fill no part of the domain.
     let mut warnings = Vec::new();
+    let origin = scope.origin();
+    if origin != [0.0; 2] {
+        warnings.push(Warning::FarDomain { corner: origin });
+    }
     regions(scene, scope, domain, &SiMatter::new(scene, scope)?, &mut warnings)?;
     let (whole, scene) = (scene, &placed(scene));
     for name in whole.materials.keys().filter(|name| !scene.materials.contains_key(*name)) {
@@ -148,6 +153,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let (tracers, marks) = dye::dye(scene, scope, length, &units)?;
     Ok(Plan {
         scene: whole.clone(),
+        origin,
         units,
         enclosure,
         boundary,
@@ -166,7 +172,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
             ..accuracy::method(scene)?
         },
         clock: time::clock(scene, scope, &units)?,
-        content: recording::content(scene)?,
+        content: recording::content(scene, &mesh)?,
         effects,
         warnings,
         mesh,

@@ -21,7 +21,8 @@ pub(super) fn check_null_spaces(
         return Ok(());
     }
     if free == [true; 2] && !mesh.x.periodic() && !mesh.y.periodic() {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "boundaries",
             "nothing holds the scene: every side is open",
             "give some boundary a velocity, or make sides periodic",
         ));

@@ -3,6 +3,7 @@
 use super::values::Result;
 use crate::plan::FrameContent;
 use crate::scene::{Scene, SceneError};
+use crate::space::mesh::Mesh;
 
 /// Okabe-Ito colours, which colour-blind readers can distinguish.
 const PALETTE: [[u8; 3]; 8] = [
@@ -18,14 +19,18 @@ const PALETTE: [[u8; 3]; 8] = [
 const BACKGROUND_COLOUR: [u8; 3] = [190, 196, 204];
 const MARK_COLOUR: [u8; 3] = [0, 60, 200];
 
+/// Largest number of glyphs along the longer side of the domain.
+const MOST_GLYPHS: f64 = 2000.0;
+
 /// Contents and colours of the frames of the recording.
-pub(super) fn content(scene: &Scene) -> Result<FrameContent> {
+pub(super) fn content(scene: &Scene, mesh: &Mesh) -> Result<FrameContent> {
     let mut colours = Vec::new();
     let mut free = PALETTE.iter().cycle();
     for (name, m) in &scene.materials {
         colours.push(match &m.colour {
             Some(text) => hex_colour(text).ok_or_else(|| {
-                SceneError::new(
+                SceneError::of_key(
+                    format!("materials.{name}.colour"),
                     format!("material `{name}`: colour is {text:?}"),
                     "give six hexadecimal digits: \"#e69f00\"",
                 )
@@ -36,6 +41,15 @@ pub(super) fn content(scene: &Scene) -> Result<FrameContent> {
     }
     colours.push(MARK_COLOUR);
     let r = &scene.recording;
+    let sizes = [mesh.x.length(), mesh.y.length()];
+    let along = f64::from(r.glyphs) * (sizes[1] / sizes[0]).max(1.0);
+    if along > MOST_GLYPHS {
+        return Err(SceneError::of_key(
+            "recording.glyphs",
+            format!("recording.glyphs would give {along:.0} strokes along the longer side"),
+            format!("give fewer: at most {MOST_GLYPHS}"),
+        ));
+    }
     Ok(FrameContent {
         colour_by: r.colour_by,
         max_particles: r.max_particles as usize,

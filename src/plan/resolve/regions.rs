@@ -2,7 +2,7 @@
 //! start.
 
 use super::materials::{SiMatter, material_index};
-use super::values::{Result, finite_range, pair, positive};
+use super::values::{Result, finite_range, point, positive, ranges};
 use crate::plan::{Area, InitialDirector, Region, Warning};
 use crate::scene::{self, Scene, SceneError, Scope, Shape};
 
@@ -17,11 +17,12 @@ pub(super) fn regions(
     let mut out = Vec::new();
     for (index, r) in scene.regions.iter().enumerate() {
         let what = format!("regions[{index}]");
-        let material = material_index(&scene.materials, &r.material, &what)?;
+        let material =
+            material_index(&scene.materials, &r.material, &what, &format!("{what}.material"))?;
         let shape = match &r.shape {
             Shape::Everywhere => Area::Everywhere,
             Shape::Rectangle { x, y } => {
-                let (rx, ry) = (pair(x, scope)?, pair(y, scope)?);
+                let [rx, ry] = ranges(x, y, scope)?;
                 for (c, (range, q)) in [(rx, x), (ry, y)].into_iter().enumerate() {
                     let tiny = 1e-9 * (domain[c][1] - domain[c][0]);
                     if range[1] < range[0] {
@@ -48,7 +49,7 @@ pub(super) fn regions(
                 Area::Rectangle { x: rx, y: ry }
             }
             Shape::Circle { centre, radius } => {
-                let (c, radius_m) = (pair(centre, scope)?, positive(radius, scope, "radius")?);
+                let (c, radius_m) = (point(centre, scope)?, positive(radius, scope, "radius")?);
                 for k in 0..2 {
                     if c[k] + radius_m < domain[k][0] || c[k] - radius_m > domain[k][1] {
                         return Err(SceneError::at(
@@ -79,7 +80,8 @@ pub(super) fn regions(
             }
             Some(scene::Director::Random) => Some(InitialDirector::Random),
             None if layered => {
-                return Err(SceneError::new(
+                return Err(SceneError::of_key(
+                    &what,
                     format!("{what}: the layered material `{}` has no directors", r.material),
                     "give director = \"random\" or director = { angle_degrees = 90 }",
                 ));

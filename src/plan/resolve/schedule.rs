@@ -20,7 +20,8 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
             (Some(t), None) => When::Time(t.eval(&scope)? / plan.units.time),
             (None, Some(step)) => When::Step(step),
             _ => {
-                return Err(SceneError::new(
+                return Err(SceneError::of_key(
+                    format!("schedule[{index}]"),
                     format!("schedule[{index}]: give either `time` or `step`"),
                     "one of them says when the change takes effect",
                 ));
@@ -28,7 +29,8 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
         };
         let other = super::without_schedule(&current)?;
         if let Some(what) = plan.beyond_matter(&other) {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                format!("schedule[{index}]"),
                 format!(
                     "schedule[{index}] changes {what}; only constant material values and gravity \
                      may change"
@@ -37,7 +39,8 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
             ));
         }
         if !follows(&plan.changes, when) {
-            return Err(SceneError::new(
+            return Err(SceneError::of_key(
+                format!("schedule[{index}]"),
                 format!("schedule[{index}] does not come after the entries above it"),
                 "order the entries of [[schedule]] that have a time, and those that have a step",
             ));

@@ -4,30 +4,43 @@ use super::values::{Result, positive};
 use crate::plan::{ClockPlan, Units};
 use crate::scene::{Scene, SceneError, Scope};
 
+/// Largest number of frames.
+const MOST_FRAMES: u32 = 1_000_000;
+
 /// End time, limits of the time step, and times of frames.
 pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<ClockPlan> {
     let t = &scene.time;
     let end = positive(&t.end, scope, "time.end")?;
     let max_step = t.max_step.as_ref().map(|q| positive(q, scope, "time.max_step")).transpose()?;
     if !(t.courant > 0.0 && t.courant <= 50.0) {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "time.courant",
             format!("time.courant is {}", t.courant),
             "cells crossed per step: above 0, at most 50; 0.5 is usual",
         ));
     }
     if !(t.tolerance > 0.0 && t.tolerance <= 1.0) {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "time.tolerance",
             format!("time.tolerance is {}", t.tolerance),
             "displacement error per step in cells: above 0, at most 1; 0.01 is usual",
         ));
     }
     if !(t.strain > 0.0 && t.strain <= 10.0) {
-        return Err(SceneError::new(
+        return Err(SceneError::of_key(
+            "time.strain",
             format!("time.strain is {}", t.strain),
             "strain per step: above 0, at most 10; 0.25 is usual",
         ));
     }
     let r = &scene.recording;
+    if r.frames > MOST_FRAMES {
+        return Err(SceneError::of_key(
+            "recording.frames",
+            format!("recording.frames is {}", r.frames),
+            format!("give 0 to {MOST_FRAMES}: every frame ends a step"),
+        ));
+    }
     let mut frames: Vec<f64> =
         (0..=r.frames).map(|k| end * f64::from(k) / f64::from(r.frames.max(1))).collect();
     for q in &r.times {

@@ -23,8 +23,26 @@ pub(in crate::plan) fn not_negative(q: &Quantity, scope: &Scope, what: &str) -> 
     Err(SceneError::at(q, format!("{what} is {v}"), format!("{what} must be zero or more")))
 }
 
-pub(in crate::plan) fn pair(q: &[Quantity; 2], scope: &Scope) -> Result<[f64; 2]> {
-    Ok([q[0].eval(scope)?, q[1].eval(scope)?])
+/// Evaluates a coordinate along an axis, relative to the origin of the scope.
+pub(in crate::plan) fn coordinate(q: &Quantity, axis: usize, scope: &Scope) -> Result<f64> {
+    Ok(q.eval(scope)? - scope.origin()[axis])
+}
+
+/// Evaluates a point, relative to the origin of the scope.
+pub(in crate::plan) fn point(q: &[Quantity; 2], scope: &Scope) -> Result<[f64; 2]> {
+    Ok([coordinate(&q[0], 0, scope)?, coordinate(&q[1], 1, scope)?])
+}
+
+/// Evaluates ranges along both axes, relative to the origin of the scope.
+pub(in crate::plan) fn ranges(
+    x: &[Quantity; 2],
+    y: &[Quantity; 2],
+    scope: &Scope,
+) -> Result<[[f64; 2]; 2]> {
+    let range = |q: &[Quantity; 2], axis| -> Result<[f64; 2]> {
+        Ok([coordinate(&q[0], axis, scope)?, coordinate(&q[1], axis, scope)?])
+    };
+    Ok([range(x, 0)?, range(y, 1)?])
 }
 
 /// The ranges of x and y of a side of the domain.

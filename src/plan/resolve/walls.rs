@@ -1,7 +1,7 @@
 //! This module resolves `[[walls]]` and `[[blocks]]` into obstacles along mesh lines, and finds the
 //! edges (lips) of apertures.
 
-use super::values::{Result, pair};
+use super::values::{Result, point, ranges};
 use crate::plan::Units;
 use crate::scene::{BoundaryKind, Quantity, Scene, SceneError, Scope, WallKind};
 use crate::space::mesh::Mesh;
@@ -33,7 +33,7 @@ pub(in crate::plan) fn axis_segment(
     scope: &Scope,
     [x, y]: [[f64; 2]; 2],
 ) -> Result<Segment> {
-    let (a, b) = (pair(from, scope)?, pair(to, scope)?);
+    let (a, b) = (point(from, scope)?, point(to, scope)?);
     let size = (x[1] - x[0]).max(y[1] - y[0]);
     let tiny = 1e-9 * size;
     for (p, q) in [(a, from), (b, to)] {
@@ -87,7 +87,7 @@ impl Walls {
         }
         let mut blocks = Vec::new();
         for b in &scene.blocks {
-            let (bx, by) = (pair(&b.x, scope)?, pair(&b.y, scope)?);
+            let [bx, by] = ranges(&b.x, &b.y, scope)?;
             for (c, r) in [bx, by].into_iter().enumerate() {
                 if r[0] >= r[1] || r[0] < domain[c][0] || r[1] > domain[c][1] {
                     errors.push(SceneError::at(
