@@ -4,6 +4,7 @@ use super::run::{Output, close};
 use super::{Failure, print};
 use crate::record::checkpoint;
 use crate::record::folder::RunFolder;
+use crate::record::replace::{Kind, may_replace};
 use crate::record::rerun_log::Sink;
 use crate::scene::{self, scene_hash};
 use crate::session::{Options, Safety, Session, SessionError, tell, watch_interrupts};
@@ -71,7 +72,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 }
                 tell(format_args!("continuing after step {step}"));
                 // The old summary describes the earlier part of the run.
-                let _ = std::fs::remove_file(folder.join("summary.json"));
+                let summary = folder.join("summary.json");
+                if may_replace(&summary, Kind::Json("state_hash")).is_ok() {
+                    let _ = std::fs::remove_file(summary);
+                }
                 return close(session.go()?, args.output);
             }
             Err(SessionError::Unfit(text)) => faults.push(text),

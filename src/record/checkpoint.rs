@@ -17,7 +17,7 @@ use super::replace::ReplaceError;
 use crate::sim::state::{Column, State};
 use sha2::{Digest, Sha256};
 use std::fs::File;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Version of the format. New columns do not need a new version.
@@ -226,9 +226,17 @@ pub fn write(
     let (later, kept): (Vec<_>, Vec<_>) = list(folder).into_iter().partition(|c| c.0 > step);
     for (_, old) in later.iter().chain(kept.iter().skip(KEPT)) {
         // A file that cannot be removed does no harm.
-        let _ = std::fs::remove_file(old);
+        if is_checkpoint(old) {
+            let _ = std::fs::remove_file(old);
+        }
     }
     Ok(path)
+}
+
+/// Whether a file starts as checkpoints do.
+fn is_checkpoint(path: &Path) -> bool {
+    let mut start = [0; MAGIC.len()];
+    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *MAGIC
 }
 
 fn replace(within: &Path, path: &Path, bytes: &[u8]) -> std::io::Result<()> {

@@ -48,6 +48,9 @@ pub enum FolderError {
 /// Name of the scene file of a run.
 pub const SCENE: &str = "scene.toml";
 
+/// Name of the file that a sweep adds to the folder of a case, with what the summary does not hold.
+pub const NOTE: &str = "case.json";
+
 /// Files that a run writes. `--force` replaces these and the checkpoints, and nothing else.
 pub const FILES: [&str; 10] = [
     "recording.rrd",
@@ -272,7 +275,10 @@ impl RunFolder {
         self.aside.discard();
         // Also those that a killed process has left.
         for k in 1..MOST_ASIDE {
-            let _ = fs::remove_dir_all(self.path.join(format!("{ASIDE}-{k}")));
+            let aside = self.path.join(format!("{ASIDE}-{k}"));
+            if strange_entry(&aside).is_none() {
+                let _ = fs::remove_dir_all(aside);
+            }
         }
         None
     }
@@ -309,12 +315,20 @@ impl Drop for RunFolder {
 }
 
 /// Whether a file or folder with this name, in the folder of a run, was made by this program.
-pub fn is_ours(name: &str) -> bool {
+fn is_ours(name: &str) -> bool {
     FILES.contains(&name)
+        || name == NOTE
         || name == checkpoint::FOLDER
         || name == lock::LOCK
         || name.starts_with(ASIDE)
         || name.ends_with(".part")
+}
+
+/// A file or folder in a folder that this program did not make; `None` if there is none.
+pub fn strange_entry(folder: &Path) -> Option<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut strange = entries.filter(|e| !e.file_name().to_str().is_some_and(is_ours));
+    strange.next().map(|e| e.path())
 }
 
 /// Kind of a file of a run.

@@ -60,14 +60,12 @@ pub struct Count {
     pub healed: u64,
 }
 
-/// Volume that was moved into an empty cell.
+/// Volume per depth (in the plan's units) of a material that was moved into an empty cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Refill {
     /// The cell that gave it and the cell that received it; they share a face.
     pub cells: [usize; 2],
-    /// Its material.
     pub material: u8,
-    /// Its volume per depth, in the plan's units.
     pub volume: f64,
 }
 

@@ -9,16 +9,14 @@
 
 use super::spec::is_plain;
 use super::{Case, List, SweepError};
+use crate::record::checkpoint;
+use crate::record::folder::{self, NOTE};
 use crate::record::replace::{self, Kind, ReplaceError};
-use crate::record::{checkpoint, folder};
 use crate::scene::SceneSource;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-
-/// Name of the file with the [`Note`] of a case, in the folder of its run.
-const NOTE: &str = "case.json";
 
 /// Kind of the list of cases.
 const LIST: Kind<'static> = Kind::Json("cases");
@@ -308,12 +306,8 @@ fn remove(folder: &Path) -> Result<(), SweepError> {
     if fs::symlink_metadata(folder).is_ok_and(|m| !m.is_dir()) {
         return Err(strange(folder.to_owned()));
     }
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let ours = name.to_str().is_some_and(|n| n == NOTE || folder::is_ours(n));
-        if !ours {
-            return Err(strange(entry.path()));
-        }
+    if let Some(path) = folder::strange_entry(folder) {
+        return Err(strange(path));
     }
     checkpoint::only_ours(folder)?;
     match fs::remove_dir_all(folder) {

@@ -238,3 +238,64 @@ fn invalid_set_assignments_are_refused() {
         here.grainscope(&["check", "silo", "--set", set]).exits(3).complains(&complaints);
     }
 }
+
+/// Every refusal of a scene names the line of the key, or of the table that lacks it.
+#[test]
+fn refusals_name_a_line() {
+    let here = TempFolder::new();
+    let text = preset_files().into_iter().find(|p| p.0 == "silo").expect("there").1;
+    here.write("s.toml", &text);
+    let named = |set: &str| {
+        let said = here.grainscope(&["check", "s.toml", "--set", set]).exits(3);
+        assert!(flat(&said.err).contains("s.toml:"), "{set}: {}", said.err);
+        let line = said.err.split("s.toml:").nth(1).and_then(|rest| rest.split(':').next());
+        let line = line.and_then(|l| l.parse::<usize>().ok());
+        assert!(line.is_some(), "{set}: {}", said.err);
+    };
+    for set in [
+        "accuracy.cells=0",
+        "accuracy.cells=100000",
+        "accuracy.particles_per_cell=17",
+        "accuracy.particles_per_cell=4294967295",
+        "accuracy.tolerance=1",
+        "accuracy.stabilisation=7",
+        "accuracy.max_corrections=0",
+        "accuracy.max_corrections=4294967295",
+        "time.courant=1e9",
+        "time.tolerance=0",
+        "time.strain=0",
+        "time.end=0",
+        "recording.frames=4294967295",
+        "recording.glyphs=4294967295",
+        "mesh.growth=5",
+        "dye.grid.spacing=1e-9",
+        "domain.length_scale=1e-6",
+        "materials.grains.colour=red",
+        "name=a/b",
+        "gauges[0].material=sand",
+        "regions[0].material=sand",
+        "boundaries.left.kind=periodic",
+    ] {
+        named(set);
+    }
+}
+
+/// Limits of the process are part of the check of the memory, and a file that may not grow is an
+/// error of its write.
+#[cfg(target_os = "linux")]
+#[test]
+fn limits_of_the_process_are_told() {
+    let here = TempFolder::new();
+    let limited = |limit: &str, run: &str| {
+        let program = env!("CARGO_BIN_EXE_grainscope");
+        let line = format!("ulimit {limit}; exec {program} {run}");
+        let mut command = Command::new("bash");
+        command.args(["-c", &line]).current_dir(here.path(".")).env("NO_COLOR", "1");
+        Said::new(&[run], command.output().expect("bash"))
+    };
+    let large = "run silo --set accuracy.cells=64 --steps 1 --no-recording --out large";
+    limited("-v 3000000", large).exits(1).complains(&["need about", "has", "left"]);
+    assert!(!here.has("large"));
+    let small = "run couette_cosserat --set accuracy.cells=8 --steps 400 --out small";
+    limited("-f 64", small).exits(1).complains(&["File too large"]);
+}

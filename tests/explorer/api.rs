@@ -468,3 +468,24 @@ fn what_was_replaced_is_freed() {
     assert!(threads_later <= threads + 8, "{threads} threads, then {threads_later}");
     assert!(memory_later < memory + 40_000, "{memory} kB, then {memory_later} kB");
 }
+
+/// Values that would need more than the machine has are refused, and the run goes on.
+#[test]
+fn values_that_are_too_large_are_refused() {
+    let explorer = Explorer::open(&SMALL);
+    for (key, value) in [
+        ("recording.frames", "4294967295"),
+        ("accuracy.cells", "4294967295"),
+        ("accuracy.particles_per_cell", "4294967295"),
+        ("recording.glyphs", "4294967295"),
+        ("recording.frames", "1e300"),
+        ("dye.grid.spacing", "1e-12"),
+    ] {
+        for verb in ["ask", "set"] {
+            let answer = explorer.ask(json!({ "do": verb, "key": key, "value": value }));
+            assert_eq!(answer["accepted"], json!(false), "{key} = {value}: {answer}");
+        }
+    }
+    explorer.steps(1);
+    assert_eq!(explorer.state()["run"]["step"], json!(1));
+}

@@ -167,7 +167,7 @@ fn regions_without_particles_and_equilibria_upside_down_are_told() {
     assert!(layers(2.0, 1.0, "").contains("exact equilibrium"));
     let wave = "[[regions]]\nmaterial = \"lower\"\nshape.where = \"y < 0.55 + 0.01*cos(pi*x)\"\n";
     assert_eq!(layers(2.0, 1.0, wave), "");
-    for tiny in ["radius = 1e-4", "radius = 1e-12"] {
+    for tiny in ["radius = 1e-9", "radius = 1e-12"] {
         let speck = format!(
             "[[regions]]\nmaterial = \"upper\"\nshape.circle = {{ centre = [0.301, 0.203], {tiny} }}\n"
         );
