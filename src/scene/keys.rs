@@ -51,7 +51,7 @@ mod tests {
             ("time.courant", "[time]"),
             ("gauges[1].name", "\"b\""),
             ("boundaries.left.kind", "\"open\""),
-            ("accuracy.tolerance", "4"),
+            ("accuracy.tolerance", "accuracy"),
         ] {
             let span = span_of(text, key).expect(key);
             assert_eq!(&text[span], found, "{key}");
