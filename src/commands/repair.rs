@@ -94,7 +94,7 @@ fn mend_table(path: &Path) -> Result<String, Failure> {
     std::fs::rename(path, &original).map_err(fault)?;
     let table: String =
         std::iter::once(&header).chain(&rows).map(|line| format!("{line}\n")).collect();
-    replace::write(path, table, Kind::Table(""))?;
+    replace::write(path, table, Kind::Checked)?;
     Ok(format!(
         "{shown}: repaired, {} rows; lost: {} damaged rows; the original is kept as {}",
         rows.len(),

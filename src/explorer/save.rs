@@ -8,7 +8,7 @@ use crate::record::rerun_log::{RecordError, RerunLog, Sink};
 use crate::record::run_plots::plots_of_run;
 use crate::record::series::SeriesWriter;
 use crate::record::summary::{Ending, Summary, Tally};
-use crate::scene::to_toml;
+use crate::scene::{is_folder_name, to_toml};
 use std::path::{Path, PathBuf};
 
 /// Maximum length of a folder name (characters).
@@ -44,8 +44,7 @@ pub enum SaveError {
 
 /// Checks that a name is a plain folder name, which cannot lead out of the parent folder.
 pub fn checked(name: &str) -> Result<&str, SaveError> {
-    let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(ordinary) {
+    if name.len() > MAX_NAME || !is_folder_name(name) {
         return Err(SaveError::Name(name.chars().take(MAX_NAME).collect()));
     }
     Ok(name)

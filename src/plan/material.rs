@@ -1,6 +1,7 @@
 //! This module defines the materials that the solver uses: dimensionless and checked.
 
 use crate::laws::Law;
+use crate::space::particles::Particles;
 
 /// A material with values in the plan's units.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,14 @@ pub struct Material {
 }
 
 impl Material {
+    /// Density of particle `k`, which is of this material.
+    pub fn density_of(&self, particles: &Particles, k: usize) -> f64 {
+        match &particles.density {
+            Some(carried) if self.carries_density => carried[k],
+            _ => self.density,
+        }
+    }
+
     /// Whether the law and the density are the same for all particles, independent of their history
     /// and of the flow.
     pub fn is_uniform(&self) -> bool {

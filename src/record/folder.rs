@@ -340,7 +340,7 @@ fn kind(name: &str) -> Kind<'static> {
         Some("svg") => Kind::Svg,
         Some("png") => Kind::Png,
         // The scene is checked separately.
-        _ => Kind::Table(""),
+        _ => Kind::Checked,
     }
 }
 

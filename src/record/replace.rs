@@ -22,6 +22,8 @@ pub enum Kind<'a> {
     Page,
     /// A file of the Visualization Toolkit.
     Vtk,
+    /// A file whose origin the caller has checked.
+    Checked,
 }
 
 /// Phrase near the start of every page that this program writes.
@@ -63,6 +65,7 @@ impl Kind<'_> {
             Kind::Svg | Kind::Png => "an image",
             Kind::Page => "a page",
             Kind::Vtk => "a VTK file",
+            Kind::Checked => "a file",
         }
     }
 
@@ -79,6 +82,7 @@ impl Kind<'_> {
             Kind::Png => head.starts_with(b"\x89PNG"),
             Kind::Page => text.contains(MARK),
             Kind::Vtk => text.contains("<VTKFile"),
+            Kind::Checked => true,
         }
     }
 }

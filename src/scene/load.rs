@@ -273,6 +273,12 @@ pub fn scene_hash(scene: &Scene) -> String {
     Sha256::digest(to_toml(scene)).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Whether a name can be that of a single folder everywhere: 1 to 100 letters, digits, `_` and `-`.
+pub fn is_folder_name(name: &str) -> bool {
+    let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    (1..=100).contains(&name.len()) && name.chars().all(ordinary)
+}
+
 /// The JSON schema of scene files, for editors.
 pub fn json_schema() -> String {
     format!("{:#}\n", schemars::schema_for!(Scene).as_value())

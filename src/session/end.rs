@@ -143,7 +143,7 @@ impl Session {
         let written = summary.write(self.folder.path()).map_err(SessionError::Environment);
         let plotted = if written.is_ok() { self.plot() } else { Ok(()) };
         if restore {
-            tell(format_args!("the earlier run remains in {}", self.folder.path().display()));
+            tell("what this run was to replace is left as it was");
         } else if let Some(place) = self.folder.settle(!fault && written.is_ok()) {
             tell(format_args!("the earlier run is kept in {}", place.display()));
         }

@@ -23,8 +23,8 @@ pub fn watch_interrupts(exit_code: u8) -> Interrupted {
         let late = move || {
             std::thread::sleep(PATIENCE);
             tell(format_args!(
-                "warning: the present step did not end within {} s of the interrupt; the last \
-                 checkpoint remains, and `grainscope resume` continues from it",
+                "warning: the work at hand did not end within {} s of the interrupt; a run with \
+                 checkpoints continues with `grainscope resume`",
                 PATIENCE.as_secs()
             ));
             std::process::exit(i32::from(exit_code));

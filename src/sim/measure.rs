@@ -117,10 +117,7 @@ impl<const D: usize> Simulation<D> {
         let g = self.matter.gravity;
         let [energy] = threads::sum(0..p.len(), |k| {
             let m = &self.matter.materials[p.material[k] as usize];
-            let density = match &p.density {
-                Some(d) if m.carries_density => d[k],
-                _ => m.density,
-            };
+            let density = m.density_of(p, k);
             let x = p.position[k];
             [-p.volume[k] * (density - ground) * (g[0] * x[0] + g[1] * x[1])]
         });

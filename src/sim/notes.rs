@@ -47,11 +47,7 @@ impl<const D: usize> Simulation<D> {
             let (mut mass, mut volume) = (0.0, 0.0);
             for k in p.of_cell(cell) {
                 let m = &materials[usize::from(p.material[k])];
-                let density = match &p.density {
-                    Some(d) if m.carries_density => d[k],
-                    _ => m.density,
-                };
-                mass += p.volume[k] * density;
+                mass += p.volume[k] * m.density_of(p, k);
                 volume += p.volume[k];
             }
             if volume > 0.0 { mass / volume } else { thin }

@@ -381,10 +381,7 @@ pub fn particle_point(
         Some(v) if m.carries_viscosity => v[p],
         _ => m.viscosity,
     };
-    let density = match &particles.density {
-        Some(d) if m.carries_density => d[p],
-        _ => m.density,
-    };
+    let density = m.density_of(particles, p);
     let director = particles.director.as_ref().filter(|_| m.law.is_layered()).map(|d| d[p]);
     let orientation = director.map_or(Orientation::default(), Orientation::of);
     let r = mesh.to_reference(cell, particles.position[p]);

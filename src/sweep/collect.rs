@@ -3,6 +3,7 @@
 use super::{Case, List, PlotSpec, State, Store, SweepError};
 use crate::record::number::short;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec as Plot, spread_plot};
+use crate::record::replace::{self, Kind};
 use crate::sim::row::find;
 use indexmap::IndexMap;
 use serde_json::Value;
@@ -359,10 +360,12 @@ fn file_name(text: &str) -> String {
 }
 
 fn write_csv(path: &Path, rows: &[Vec<String>]) -> Result<(), SweepError> {
-    let fault = |e: csv::Error| SweepError::Broken { path: path.to_owned(), cause: e.to_string() };
-    let mut writer = csv::Writer::from_path(path).map_err(fault)?;
-    rows.iter().try_for_each(|row| writer.write_record(row)).map_err(fault)?;
-    writer.flush().map_err(SweepError::file("write", path))
+    let fault = |cause: String| SweepError::Broken { path: path.to_owned(), cause };
+    let mut writer = csv::Writer::from_writer(vec![]);
+    rows.iter().try_for_each(|row| writer.write_record(row)).map_err(|e| fault(e.to_string()))?;
+    let text = writer.into_inner().map_err(|e| fault(e.to_string()))?;
+    let first = rows.first().and_then(|header| header.first()).map_or("", String::as_str);
+    Ok(replace::write(path, text, Kind::Table(first))?)
 }
 
 #[cfg(test)]

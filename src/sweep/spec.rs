@@ -1,7 +1,7 @@
 //! This module defines sweep files: a scene, its varied parameters and the plots of the results.
 
 use super::{Sample, SweepError};
-use crate::scene::{SceneError, closest};
+use crate::scene::{SceneError, closest, is_folder_name};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -155,7 +155,7 @@ fn read(name: &str, text: &str) -> Result<Spec, SweepError> {
         let help = "`grainscope sweep presets fig3` shows a valid example";
         broken(e.to_string().trim_end().to_owned(), help)
     })?;
-    if !spec.name.is_empty() && !is_plain(&spec.name) {
+    if !spec.name.is_empty() && !is_folder_name(&spec.name) {
         let help = "it names a folder: use 1 to 100 letters, digits, `_` and `-`";
         return Err(broken(format!("its name is {:?}", spec.name), help));
     }
@@ -164,12 +164,6 @@ fn read(name: &str, text: &str) -> Result<Spec, SweepError> {
         return Err(broken(format!("schema {} is not known", spec.schema), &help));
     }
     Ok(spec)
-}
-
-/// Whether a name is that of a single folder.
-pub fn is_plain(name: &str) -> bool {
-    let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    (1..=100).contains(&name.len()) && name.chars().all(ordinary)
 }
 
 /// The built-in sweep with the most similar name, for error messages.

@@ -7,12 +7,11 @@
 //! running/<id>              unfinished runs, each under a lock
 //! ```
 
-use super::spec::is_plain;
 use super::{Case, List, SweepError};
 use crate::record::checkpoint;
 use crate::record::folder::{self, NOTE};
 use crate::record::replace::{self, Kind, ReplaceError};
-use crate::scene::SceneSource;
+use crate::scene::{SceneSource, is_folder_name};
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Seek, SeekFrom};
@@ -88,7 +87,7 @@ impl Store {
                 let what = "the scene of a sweep";
                 return Err(ReplaceError::Foreign { path: self.scene(), what }.into());
             }
-            replace::write(&self.scene(), source.text(), Kind::Table(""))?;
+            replace::write(&self.scene(), source.text(), Kind::Checked)?;
         }
         Ok(replace::write(&self.cases(), format!("{json}\n"), LIST)?)
     }
@@ -290,7 +289,7 @@ fn correct_paths(from: &Path, to: &Path) {
 /// Checks the names in a list: they become names of folders.
 fn check_names(list: &List) -> Result<(), String> {
     let names = list.cases.iter().map(|c| &c.id).chain(Some(&list.spec.name));
-    match names.into_iter().find(|name| !is_plain(name)) {
+    match names.into_iter().find(|name| !is_folder_name(name)) {
         Some(name) => Err(format!(
             "the name {name:?} is not one that grainscope gives: expected letters, digits, `_` and \
              `-`; make the list again with `grainscope sweep`"

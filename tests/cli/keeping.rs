@@ -113,6 +113,9 @@ fn files_of_the_user_are_not_replaced() {
     keeps("out/frames.csv", &["export", "a", "--format", "csv", "--out", "out"]);
     let sweep = ["sweep", "couette_cosserat", "--vary", "accuracy.seed=1,2", "--dry-run"];
     keeps("out/scene.toml", &[&sweep[..], &["--out", "out"]].concat());
+    std::fs::create_dir(here.path("tables")).expect("a folder");
+    let sweep = ["sweep", "couette_cosserat", "--vary", "accuracy.cells=4,5", "--out", "tables"];
+    keeps("tables/table.csv", &sweep);
     for name in ["recording.rrd", "summary.json", "series.csv", "outflow.png"] {
         let folder = format!("with_{name}");
         std::fs::create_dir(here.path(&folder)).expect("a folder");

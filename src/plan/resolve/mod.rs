@@ -19,7 +19,7 @@ pub use schedule::resolve;
 
 use super::boundary::{self, SIDES};
 use super::{EffectSet, InitialFields, Method, Plan, Warning};
-use crate::scene::{Field, FieldFn, Scene, SceneError, Scope};
+use crate::scene::{Field, FieldFn, Scene, SceneError, Scope, is_folder_name};
 use crate::space::shape::side_normal;
 use materials::{SiMatter, thin_fluid};
 use regions::{placed, regions};
@@ -29,8 +29,7 @@ use walls::Walls;
 
 /// Resolves a scene as if its schedule were empty.
 fn without_schedule(scene: &Scene) -> Result<Plan> {
-    let ordinary = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if scene.name.is_empty() || scene.name.len() > 100 || !scene.name.chars().all(ordinary) {
+    if !is_folder_name(&scene.name) {
         return Err(SceneError::of_key(
             "name",
             format!("the scene's name is {:?}", scene.name),

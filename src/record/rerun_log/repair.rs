@@ -16,7 +16,7 @@ use rerun::sink::LogSink;
 use super::decode::ReadError;
 use super::decode::{chunk_of, messages};
 use super::read::below_run;
-use super::salvage::{Damage, salvage};
+use super::salvage::{Damage, has_sound_index, salvage};
 use super::sinks::{Destinations, RrdFile, Saved, Sink};
 use super::{RecordError, RerunLog, STEP};
 use crate::frame::RunInfo;
@@ -145,34 +145,45 @@ pub struct Repaired {
 /// Closes a recording whose end is missing, and removes damaged parts; the original of a damaged
 /// recording is kept beside it. A complete recording is not changed.
 pub fn repair(path: &Path) -> Result<Repaired, RepairError> {
+    match keep(path, None, |_| {}) {
+        Ok(kept) if kept.cut.is_none() && has_sound_index(path)? => {
+            let damage = Damage::default();
+            return Ok(Repaired { kept, damage, saved: None, original: None });
+        }
+        Err(e @ ReadError::Open { .. }) => return Err(e.into()),
+        // Damaged files are read in another way.
+        Ok(_) | Err(_) => {}
+    }
+    let part = beside(path, ".part");
+    let mended = mend(path, &part);
+    if mended.is_err() {
+        let _ = std::fs::remove_file(&part);
+    }
+    mended
+}
+
+/// Writes what can be read of a recording to `part`, and puts that in its place.
+fn mend(path: &Path, part: &Path) -> Result<Repaired, RepairError> {
+    let mut file = RrdFile::create(part)?;
     let mut kept = Kept::default();
     let damage = salvage(path, |message| {
-        kept.take(message, None).inspect(|m| kept.messages += usize::from(m.is_some())).ok();
+        // A message whose data cannot be read is damaged.
+        let Ok(message) = kept.take(message, None) else { return false };
+        if let Some(message) = message {
+            kept.messages += 1;
+            file.send(message);
+        }
+        true
     })?;
     if kept.messages == 0 {
         let cause = "it holds nothing that can be read".to_owned();
         return Err(ReadError::Unreadable { path: path.to_owned(), cause }.into());
     }
-    if damage == Damage::default() {
-        return Ok(Repaired { kept, damage, saved: None, original: None });
-    }
-    let part = beside(path, ".part");
-    let mut file = RrdFile::create(&part)?;
-    salvage(path, |message| file.send(message))?;
-    let written = file.finish().and_then(|_| file.settle(None));
-    let mut original = None;
-    let placed = written.and_then(|()| {
-        if damage.places > 0 {
-            original = Some(set_aside(path)?);
-        }
-        file.settle(Some(path))
-    });
-    if placed.is_err() {
-        let _ = std::fs::remove_file(&part);
-    }
-    placed?;
-    let saved = Some(file.finished()?);
-    Ok(Repaired { kept, damage, saved, original })
+    file.finish()?;
+    file.settle(None)?;
+    let original = (damage.places > 0).then(|| set_aside(path)).transpose()?;
+    file.settle(Some(path))?;
+    Ok(Repaired { kept, damage, saved: Some(file.finished()?), original })
 }
 
 /// Renames a damaged recording; returns its new path.

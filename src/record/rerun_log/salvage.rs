@@ -5,7 +5,7 @@
 //! by decoding it; damaged values inside a payload that can be decoded are not found.
 
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use rerun::external::re_log_encoding::{DecoderApp, MessageHeader, StreamFooter, StreamHeader};
@@ -22,8 +22,6 @@ pub struct Damage {
     pub bytes: u64,
     /// Whether the end is missing, as in the recording of a killed run.
     pub open: bool,
-    /// Whether the index at the end is damaged. It can be made again.
-    pub index: bool,
 }
 
 const HEADER: usize = MessageHeader::ENCODED_SIZE_BYTES;
@@ -32,17 +30,20 @@ const STORE: u64 = 1;
 /// Largest accepted message that holds no data (bytes).
 const LARGEST_OTHER: u64 = 1 << 20;
 
-/// Calls `each` with every message that can be read, in order.
+/// Calls `each` with every message that can be decoded, in order; it returns whether the message can
+/// be used.
 ///
 /// # Errors
 /// The file cannot be read, or is not a recording.
-pub(super) fn salvage(path: &Path, mut each: impl FnMut(LogMsg)) -> Result<Damage, ReadError> {
+pub(super) fn salvage(
+    path: &Path,
+    mut each: impl FnMut(LogMsg) -> bool,
+) -> Result<Damage, ReadError> {
     let opened = |source| ReadError::Open { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(opened)?;
     let mut damage = Damage { open: !is_closed(&mut file).map_err(opened)?, ..Damage::default() };
     let mut bytes = vec![];
-    file.rewind().and_then(|()| file.read_to_end(&mut bytes)).map_err(opened)?;
-    damage.index = !damage.open && !index_is_sound(&bytes);
+    file.read_to_end(&mut bytes).map_err(opened)?;
     let Some((header, rest)) = bytes.split_at_checked(StreamHeader::ENCODED_SIZE_BYTES) else {
         let cause = "it is empty".to_owned();
         return Err(ReadError::Unreadable { path: path.to_owned(), cause });
@@ -52,36 +53,31 @@ pub(super) fn salvage(path: &Path, mut each: impl FnMut(LogMsg)) -> Result<Damag
     let (mut at, mut lost) = (0, 0);
     let mut unpacked = vec![];
     while let Some(head) = Head::read(rest, at) {
-        let found = match head {
-            Head::Message { kind: END, .. } => {
-                break;
-            }
+        let taken = match head {
+            Head::Message { kind: END, .. } => break,
             Head::Message { kind, length } => {
                 let whole = &rest[at..at + HEADER + length];
                 let sound = kind != ARROW || is_sound(&whole[HEADER..], &mut unpacked);
-                sound.then(|| decode(&start, whole)).flatten().map(|m| (kind, whole, m))
+                let message = sound.then(|| decode(&start, whole)).flatten();
+                message.is_some_and(&mut each).then_some((kind, whole))
             }
             Head::Invalid => None,
         };
-        match found {
-            Some((kind, whole, message)) => {
-                if lost > 0 {
-                    damage.places += 1;
-                    damage.bytes += lost;
-                    lost = 0;
-                }
-                if kind == STORE {
-                    start.extend(whole);
-                }
-                each(message);
-                at += whole.len();
-            }
-            None => {
-                let next = next_message(rest, at + 1, &mut unpacked);
-                lost += (next - at) as u64;
-                at = next;
-            }
+        let Some((kind, whole)) = taken else {
+            let next = next_message(rest, at + 1, &mut unpacked);
+            lost += (next - at) as u64;
+            at = next;
+            continue;
+        };
+        if lost > 0 {
+            damage.places += 1;
+            damage.bytes += lost;
+            lost = 0;
         }
+        if kind == STORE {
+            start.extend(whole);
+        }
+        at += whole.len();
     }
     // Without an end, an incomplete last message is what a killed run leaves.
     if lost > 0 && !damage.open {
@@ -89,6 +85,15 @@ pub(super) fn salvage(path: &Path, mut each: impl FnMut(LogMsg)) -> Result<Damag
         damage.bytes += lost;
     }
     Ok(damage)
+}
+
+/// Whether the index at the end of a closed recording is undamaged.
+///
+/// # Errors
+/// The file cannot be read.
+pub(super) fn has_sound_index(path: &Path) -> Result<bool, ReadError> {
+    let opened = |source| ReadError::Open { path: path.to_owned(), source };
+    Ok(index_is_sound(&std::fs::read(path).map_err(opened)?))
 }
 
 /// Whether the index of a closed recording has the checksum that its footer states.
