@@ -142,7 +142,9 @@ fn a_first_session() {
 #[test]
 fn two_tabs_show_the_same_run_and_can_be_closed() {
     let Some(browser) = Browser::start([1280, 720], false) else { return };
-    let explorer = Explorer::open(&["silo", "--set", "accuracy.cells=2", "--paused"]);
+    // A run that cannot end during the test, however slow the browser is.
+    let scene = ["silo", "--set", "accuracy.cells=2", "--set", "time.courant=0.01", "--paused"];
+    let explorer = Explorer::open(&scene);
     browser.go(&explorer.url);
     browser.wait_for("state", "state && state.knobs.length > 0");
     let first = browser.window();
