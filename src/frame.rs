@@ -45,6 +45,9 @@ pub struct ParticleSnapshot {
     pub positions: Vec<[f32; 2]>,
     /// Material of each particle: an index into [`RunInfo::materials`].
     pub class: Vec<u16>,
+    /// Radius at which each particle is drawn (m), from the volume it carries: squares of this
+    /// volume are covered up to their corners.
+    pub radii: Vec<f32>,
     /// Quantity that colours the particles; `None` colours them by material.
     pub scalar: Option<ParticleScalar>,
 }
@@ -211,7 +214,8 @@ pub struct RunInfo {
     pub gauges: Vec<Outline>,
     /// Materials, in the order of [`ParticleSnapshot::class`].
     pub materials: Vec<Material>,
-    /// Radius at which particles are drawn (m).
+    /// Half the distance of particles at the start (m): the radius at which particles without a
+    /// radius of their own are drawn.
     pub particle_radius: f32,
     /// Quantity of [`ParticleSnapshot::scalar`], if this run records it.
     pub particle_quantity: Option<Quantity>,

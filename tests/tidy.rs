@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the library, lowest layer first, and the modules that each may import.
-const MODULES: [(&str, &[&str]); 25] = [
+const MODULES: [(&str, &[&str]); 26] = [
     ("testing", &[]),
     ("threads", &[]),
     ("simd", &[]),
@@ -31,13 +31,17 @@ const MODULES: [(&str, &[&str]); 25] = [
     ("results", &["frame", "scene", "plan", "sim", "record"]),
     ("compare", &["frame", "scene", "plan", "record", "results"]),
     ("export", &["frame", "record", "results"]),
+    ("light", &["frame", "sim", "record", "results"]),
     ("sweep", &["scene", "plan", "sim", "record", "testing", "simd"]),
-    ("explorer", &["frame", "scene", "plan", "sim", "cost", "record", "session", "web"]),
+    (
+        "explorer",
+        &["frame", "scene", "plan", "sim", "cost", "record", "results", "session", "light", "web"],
+    ),
     (
         "commands",
         &[
             "frame", "scene", "plan", "sim", "cases", "verify", "cost", "stress", "record",
-            "session", "results", "compare", "explorer", "sweep", "export", "simd",
+            "session", "results", "compare", "explorer", "sweep", "export", "light", "simd",
         ],
     ),
 ];

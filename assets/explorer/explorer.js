@@ -8,12 +8,6 @@ let lastNews = 0;
 let viewerReady = false;
 const curves = new Map(); // run id -> {columns, points}
 
-function make(tag, properties = {}, ...children) {
-  const node = Object.assign(document.createElement(tag), properties);
-  node.append(...children);
-  return node;
-}
-
 // --- communication with the session ---
 
 async function send(command) {
@@ -28,7 +22,7 @@ async function send(command) {
   } catch (_) {
     answer = { accepted: false, message: "grainscope does not answer" };
   }
-  if (command.do !== "ask") toast(answer.message + (answer.remedy ? ` — ${answer.remedy}` : ""), answer.accepted);
+  if (!["ask", "list"].includes(command.do)) toast(answer.message + (answer.remedy ? ` — ${answer.remedy}` : ""), answer.accepted);
   return answer;
 }
 
@@ -126,30 +120,72 @@ function render() {
     lastNews = state.news.number;
   }
   showStream();
-  sketch();
+  showLight();
 }
 
 function showStream() {
   if (viewerReady && state && state.stream) $("viewer").contentWindow.show(state.stream, state.run ? state.run.time : null, state.pins.length > 0);
 }
 
-// --- a sketch of the flow, until the viewer shows its first frame ---
+// --- the light view ---
 
-let sketching = false;
-let sketched = null;
-async function sketch() {
-  const id = state.run && `${state.run.id} ${state.run.step}`;
-  if (document.body.dataset.showing || sketching || !id || sketched === id) return;
-  sketching = true;
+const light = new LightView($("light"), async (run, k) => {
+  const response = await fetch(`api/runs/${run.id}/${run.steps[k]}`);
+  return response.ok ? new Uint8Array(await response.arrayBuffer()) : null;
+});
+const listings = new Map(); // run id -> listing
+let listing = false;
+
+// Reads which frames there are, and shows the latest one unless the user looks at an earlier one.
+async function showLight() {
+  if (listing || !state.run) return;
+  listing = true;
   try {
-    const response = await fetch("api/sketch");
-    if (response.ok) drawSketch($("sketch"), await response.json());
-    sketched = id;
+    for (;;) {
+      const wanted = [[state.run.id, state.run.picture], ...state.pins.map((p) => [p.id, 0])];
+      if (!changed("light", wanted)) return;
+      for (const id of listings.keys()) if (!wanted.some((w) => w[0] === id)) listings.delete(id);
+      for (const [id] of wanted) {
+        if (id !== state.run.id && listings.has(id)) continue;
+        const response = await fetch(`api/runs/${id}`);
+        if (!response.ok) { seen.delete("light"); return; }
+        listings.set(id, await response.json());
+      }
+      const runs = wanted.map((w) => listings.get(w[0]));
+      light.update(runs);
+    }
   } catch (_) {
     // The next state from the session causes another attempt.
+    seen.delete("light");
   } finally {
-    sketching = false;
+    listing = false;
   }
+}
+
+// --- which view is shown ---
+
+// The Rerun viewer is loaded when it is chosen, or at once where a graphics card draws it.
+let chosenView = null; // the choice of the user
+function chooseView(name) {
+  chosenView = name;
+  if (name === "rerun") loadViewer();
+  showView();
+}
+
+function loadViewer() {
+  if ($("viewer").src) return;
+  $("viewer").src = "viewer/";
+  $("loading").hidden = false;
+}
+
+function showView() {
+  const ready = Boolean(document.body.dataset.showing);
+  const rerun = chosenView ? chosenView === "rerun" && ready : ready;
+  $("light").hidden = rerun;
+  $("loading").hidden = rerun || chosenView === "light" || !$("viewer").src;
+  $("view-light").setAttribute("aria-pressed", String(!rerun));
+  $("view-rerun").setAttribute("aria-pressed", String(rerun));
+  $("live").hidden = !rerun;
 }
 
 function renderScenes() {
@@ -190,14 +226,20 @@ function seconds(s) {
   return s < 100 ? `${short(s, 2)} s` : `${short(s / 60, 2)} min`;
 }
 
+// A time and the end of the run, in one unit.
+function duration(time, end) {
+  const [name, unit] = timeUnit(end);
+  return `${short(time / unit, 4)} of ${short(end / unit, 3)} ${name}`;
+}
+
 function renderNumbers(run) {
   $("bar").style.width = `${Math.min(100, (100 * run.time) / run.end)}%`;
   const rate = run.steps_per_second;
   const items = [
     ["step", String(run.step), ""],
     ["steps/s", rate === null ? "–" : short(rate, 2), ""],
-    ["time", `${short(run.time, 4)} of ${short(run.end, 3)} s`, "wide"],
-    ["time step", `${short(run.dt)} s`, "wide"],
+    ["time", duration(run.time, run.end), "wide"],
+    ["time step", `${short(run.dt / timeUnit(run.dt)[1])} ${timeUnit(run.dt)[0]}`, "wide"],
     ["limited by", run.limited_by, "wide"],
     ...run.readings.map((r) => [r.name, `${short(r.value, 4)} ${r.unit}`, "wide"]),
     ["cells", `${run.cells[0]} × ${run.cells[1]}`, ""],
@@ -441,6 +483,8 @@ $("run").onclick = toggle;
 $("step").onclick = () => send({ do: "step" });
 $("restart").onclick = () => send({ do: "restart" });
 $("stop").onclick = () => send({ do: "stop" });
+$("view-light").onclick = () => chooseView("light");
+$("view-rerun").onclick = () => chooseView("rerun");
 $("live").onclick = () => { if (viewerReady) $("viewer").contentWindow.goLive(); };
 $("quit").onclick = () => { if (confirm("End grainscope? Unsaved runs are lost.")) send({ do: "quit" }); };
 $("scene").onchange = async (event) => {
@@ -479,8 +523,10 @@ window.addEventListener("message", (event) => {
   if (event.origin !== location.origin || !event.data || !event.data.viewer) return;
   if (event.data.viewer === "key") press(event.data.key);
   if (event.data.viewer === "ready") { viewerReady = true; showStream(); }
-  if (event.data.viewer === "showing") { $("loading").hidden = $("sketch").hidden = true; document.body.dataset.showing = event.data.recording; }
-  if (event.data.viewer === "failed") { $("loading").hidden = false; $("loading").textContent = `The viewer failed: ${event.data.why}`; }
+  if (event.data.viewer === "showing") { document.body.dataset.showing = event.data.recording; showView(); }
+  if (event.data.viewer === "failed") { chooseView("light"); toast(`The Rerun viewer failed: ${event.data.why}`, false); }
 });
 window.addEventListener("resize", renderPlots);
+if (graphicsCard()) loadViewer();
+showView();
 listen();

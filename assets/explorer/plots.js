@@ -1,4 +1,4 @@
-// This file draws plots with curves of several runs, and the sketch of the flow.
+// This file draws plots with curves of several runs.
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -9,28 +9,6 @@ function draw(tag, attributes, text) {
   for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
   if (text !== undefined) node.textContent = text;
   return node;
-}
-
-// Formats a number with few characters.
-function short(value, digits = 3) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size >= 1e5 || size < 1e-3) {
-    const [m, e] = value.toExponential(digits - 1).split("e");
-    return `${m.includes(".") ? m.replace(/\.?0+$/, "") : m}e${Number(e)}`;
-  }
-  return String(Number(value.toPrecision(digits)));
-}
-
-// Returns about `count` round numbers within a range, for the ticks of an axis.
-function ticks(low, high, count) {
-  const step0 = (high - low) / count;
-  const power = 10 ** Math.floor(Math.log10(step0));
-  const step = [1, 2, 5, 10].map((k) => k * power).find((s) => s >= step0 * 0.999);
-  const list = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) list.push(k * step);
-  return list;
 }
 
 // Draws one column of several runs into an SVG element.
@@ -75,11 +53,12 @@ function plot(svg, column, runs, changes) {
     const text = log ? `1e${Number(v.toPrecision(3))}` : short(v);
     svg.append(draw("text", { x: left - 4, y: Y(v) + 3, "text-anchor": "end" }, text));
   }
-  const across = ticks(x0, x1, 4);
+  const [second, seconds] = timeUnit(x1);
+  const across = ticks(x0 / seconds, x1 / seconds, Math.max(1.5, Math.min(4, w / 75))).map((v) => v * seconds);
   across.forEach((v, k) => {
     const last = k === across.length - 1;
     const anchor = X(v) > w - 30 ? "end" : "middle";
-    svg.append(draw("text", { x: X(v), y: h - 3, "text-anchor": anchor }, last ? `${short(v)} s` : short(v)));
+    svg.append(draw("text", { x: X(v), y: h - 3, "text-anchor": anchor }, last ? `${short(v / seconds)} ${second}` : short(v / seconds)));
   });
   for (const t of changes) {
     if (t === null || t > x1) continue;
@@ -92,33 +71,4 @@ function plot(svg, column, runs, changes) {
     const end = points[points.length - 1];
     svg.append(draw("circle", { cx: X(end[0]), cy: Y(end[1]), r: 2.2, fill: run.color }));
   }
-}
-
-// Draws grains, dye and walls on a canvas.
-function drawSketch(canvas, picture) {
-  const box = canvas.getBoundingClientRect();
-  const dense = devicePixelRatio || 1;
-  [canvas.width, canvas.height] = [box.width * dense, box.height * dense];
-  const pen = canvas.getContext("2d");
-  const [[x0, y0], [x1, y1]] = picture.domain;
-  const pad = 24 * dense;
-  const scale = Math.min((canvas.width - 2 * pad) / (x1 - x0), (canvas.height - 2 * pad) / (y1 - y0));
-  const X = (x) => canvas.width / 2 + scale * (x - 0.5 * (x0 + x1));
-  const Y = (y) => canvas.height / 2 - scale * (y - 0.5 * (y0 + y1));
-  const style = getComputedStyle(canvas);
-  for (const [[r, g, b], places] of picture.grains) {
-    pen.fillStyle = `rgb(${r} ${g} ${b})`;
-    for (const [x, y] of places) pen.fillRect(X(x) - dense, Y(y) - dense, 2 * dense, 2 * dense);
-  }
-  pen.strokeStyle = style.color;
-  const lines = (list, width) => {
-    pen.lineWidth = width * dense;
-    for (const line of list) {
-      pen.beginPath();
-      line.forEach(([x, y], k) => (k ? pen.lineTo(X(x), Y(y)) : pen.moveTo(X(x), Y(y))));
-      pen.stroke();
-    }
-  };
-  lines(picture.dye, 0.8);
-  lines(picture.walls, 2.5);
 }

@@ -1,7 +1,9 @@
 //! This module implements `grainscope compare`: runs side by side, in numbers and in one recording.
 
+use super::report::write as write_report;
 use super::{Failure, print};
 use crate::compare::{self, Comparison, Tolerance};
+use crate::light::reel::Detail;
 use crate::record::replace::{Aside, Kind, beside, may_replace};
 use crate::record::rerun_log::{Served, Sink};
 use crate::results::{self, Member, ResultsError};
@@ -27,6 +29,9 @@ pub struct Args {
     /// =1e-3 in its unit; may be repeated
     #[arg(long = "tolerance", value_name = "KEY=AMOUNT")]
     tolerances: Vec<Tolerance>,
+    /// Write report.html beside the recording: the flows side by side, curves, results
+    #[arg(long, conflicts_with = "no_output")]
+    report: bool,
     /// Print the comparison as JSON
     #[arg(long)]
     json: bool,
@@ -63,7 +68,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         if args.serve || args.open {
             sinks.push(Sink::Serve { port: args.port });
         }
-        write(found, &members, &path, &sinks)?
+        let (mut comparison, served) = write(found, &members, &path, &sinks)?;
+        if args.report {
+            let page = path.with_file_name("report.html");
+            write_report(&members, Detail::default(), &page)?;
+            comparison.files.push(page.display().to_string());
+        }
+        (comparison, served)
     };
     for note in &comparison.notes {
         eprintln!("note: {note}");

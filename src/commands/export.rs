@@ -10,7 +10,8 @@ use std::path::PathBuf;
 pub struct Args {
     /// Folder of a run, or a recording
     run: PathBuf,
-    /// vtu: VTK files and .pvd series that ParaView opens; csv: tables
+    /// vtu: VTK files and .pvd series that ParaView opens; csv: tables; parquet: tables for data
+    /// frames, with the series
     #[arg(long, value_enum)]
     format: FormatName,
     /// Folder of the output [default: <folder of the run>/<format>]
@@ -22,6 +23,7 @@ pub struct Args {
 enum FormatName {
     Vtu,
     Csv,
+    Parquet,
 }
 
 impl From<ExportError> for Failure {
@@ -39,6 +41,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (format, name) = match args.format {
         FormatName::Vtu => (Format::Vtu, "vtu"),
         FormatName::Csv => (Format::Csv, "csv"),
+        FormatName::Parquet => (Format::Parquet, "parquet"),
     };
     let beside = if args.run.is_dir() { Some(args.run.as_path()) } else { args.run.parent() };
     let folder = args.out.clone().unwrap_or_else(|| beside.unwrap_or(&args.run).join(name));

@@ -10,10 +10,14 @@ mod doctor;
 mod explore;
 mod export;
 mod figure;
+mod film;
 mod memory;
+mod new;
 mod plan;
 mod presets;
+mod reference;
 mod repair;
+mod report;
 mod resume;
 mod run;
 mod stress;
@@ -119,8 +123,12 @@ enum Command {
     Cost(cost::Args),
     /// Compare runs: values, curves, fields and scenes, and one recording side by side
     Compare(compare::Args),
-    /// Export a recording's particles and fields: VTK files for ParaView, or tables
+    /// Export particles and fields: VTK files for ParaView, CSV or Parquet tables
     Export(export::Args),
+    /// Write one page of runs that opens from a disk: the flow, curves, results, scene
+    Report(report::Args),
+    /// Draw the frames of runs: a film (.gif, .mp4) or images (.png)
+    Film(film::Args),
     /// Run a scene for many values of its parameters, here or on a cluster
     Sweep(sweep::Args),
     /// Make a figure of the source paper: runs, plots, snapshots, a recording side by side
@@ -131,6 +139,10 @@ enum Command {
     Doctor(doctor::Args),
     /// Print the columns of the series with units and meanings, as Markdown
     Columns,
+    /// Write a commented skeleton of a scene, to start from
+    New(new::Args),
+    /// Print the reference of scene files as Markdown: every key, value, default and meaning
+    Reference(reference::Args),
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -303,9 +315,13 @@ fn run_command(command: Command) -> Result<(), Failure> {
         Command::Cost(args) => cost::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Report(args) => report::run(&args),
+        Command::Film(args) => film::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Figure(args) => figure::run(&args),
         Command::Columns => print(&columns::markdown()),
+        Command::New(args) => new::run(&args),
+        Command::Reference(args) => reference::run(&args),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

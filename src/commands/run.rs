@@ -2,11 +2,14 @@
 //! plots.
 
 use super::chosen;
+use super::report::write as write_report;
 use super::{Failure, memory, print};
+use crate::light::reel::Detail;
 use crate::record::folder::{self, Loaded};
 use crate::record::rerun_log::Sink;
 use crate::record::summary::Ending;
 use crate::record::text::duration;
+use crate::results::Member;
 use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash};
 use crate::session::{
     Budget, Ended, Options, Recording, Safety, Session, tell, wait_for_interrupt, watch_interrupts,
@@ -73,6 +76,9 @@ pub struct Output {
     /// Print seconds per phase at the end
     #[arg(long)]
     pub profile: bool,
+    /// Write report.html into the folder at the end: the flow, curves, results, scene
+    #[arg(long)]
+    pub report: bool,
 }
 
 impl Args {
@@ -126,6 +132,12 @@ pub fn close(ended: Ended, output: Output) -> Result<(), Failure> {
         print(&ended.json)?;
     } else {
         print(&report(&ended, output.profile))?;
+    }
+    if output.report {
+        let folder = Path::new(&ended.summary.folder);
+        let members = [Member::open(folder)?];
+        let said = write_report(&members, Detail::default(), &folder.join("report.html"))?;
+        tell(format_args!("{said}"));
     }
     if let (Some(served), None) = (&ended.served, &ended.failure) {
         tell(format_args!("still serving {} (Ctrl-C ends)", served.url()));

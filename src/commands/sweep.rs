@@ -98,6 +98,9 @@ enum Command {
         /// Record these cases side by side (numbers or ids) [default: those of the first seed]
         #[arg(long, num_args = 0.., value_name = "CASE")]
         side_by_side: Option<Vec<String>>,
+        /// Write report.html of the same cases: the flows side by side, curves, results
+        #[arg(long)]
+        report: bool,
     },
     /// Run one case, for job arrays of batch systems
     Case {
@@ -138,10 +141,10 @@ impl From<SweepError> for Failure {
 pub fn run(args: &Args) -> Result<(), Failure> {
     match &args.command {
         None => sweep(args),
-        Some(Command::Collect { folder, side_by_side }) => {
+        Some(Command::Collect { folder, side_by_side, report }) => {
             let store = Store::new(folder);
             let (list, _) = store.read()?;
-            collect(&store, &list, side_by_side.as_deref())
+            collect(&store, &list, side_by_side.as_deref(), *report)
         }
         Some(Command::Case { folder, case, stop_with_input }) => {
             one(&Store::new(folder), case, *stop_with_input)
@@ -221,7 +224,7 @@ fn sweep(args: &Args) -> Result<(), Failure> {
         drive(engine.as_ref(), &store, open, &interrupted)?;
     }
     if list.cases.iter().any(|c| store.state(&c.id) == State::Done) {
-        collect(&store, &list, spec.side_by_side.then_some(&[][..]))?;
+        collect(&store, &list, spec.side_by_side.then_some(&[][..]), false)?;
     }
     eprintln!("in {}", duration(clock.elapsed().as_secs_f64()));
     if interrupted.load(Ordering::SeqCst) {

@@ -41,6 +41,11 @@ impl FrameBuffer {
         self.frames.last().is_some_and(|f| f.snapshot.is_some())
     }
 
+    /// Step of the last frame that has a snapshot.
+    pub fn last_picture(&self) -> Option<u64> {
+        self.frames.iter().rev().find(|f| f.snapshot.is_some()).map(|f| f.step)
+    }
+
     /// Removes every second snapshot, except the first and the last.
     fn thin(&mut self, wanted_too: bool) {
         let last = self.frames.len().saturating_sub(1);
@@ -65,7 +70,7 @@ fn size(frame: &Frame) -> usize {
     let Snapshot { particles, dye_lines, glyphs, fields, arrows, isolines } = p;
     let arrows = arrows.as_ref().map_or(0, |a| 16 * a.origins.len());
     let strips = isolines.iter().flat_map(|i| &i.strips).map(Vec::len).sum::<usize>();
-    10 * particles.positions.len()
+    14 * particles.positions.len()
         + particles.scalar.as_ref().map_or(0, |s| 4 * s.values.len())
         + 8 * dye_lines.iter().map(Vec::len).sum::<usize>()
         + 16 * glyphs.len()

@@ -8,6 +8,10 @@ use crate::scene::{Scene, Scope};
 use indexmap::IndexMap;
 use serde::Serialize;
 
+/// Exponent of the growth of the step time with the number of unknowns, between those of assembly
+/// and factorisation.
+pub const STEP_GROWTH: f64 = 1.3;
+
 /// A number of the scene that can be set with a slider.
 #[derive(Clone, Debug, Serialize)]
 pub struct Knob {

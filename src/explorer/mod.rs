@@ -13,6 +13,7 @@
 //! hold no state: all open pages show the same session.
 
 mod draft;
+mod editor;
 mod frame_buffer;
 mod knobs;
 mod library;
@@ -102,7 +103,8 @@ impl Explorer {
         let (sender, receiver) = bounded(WAITING);
         let status = Arc::new(Status::new(streams));
         let shared = status.clone();
-        let site = server::Site { commands: sender, status };
+        let desk = editor::Desk::new(settings.folder.clone(), &settings.scene, settings.from_file);
+        let site = server::Site { commands: sender, status, desk };
         let routes = server::routes(guard, site).ok_or(ExplorerError::NoViewer)?;
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let session = thread("session")

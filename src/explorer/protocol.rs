@@ -35,6 +35,15 @@ pub enum Command {
         /// Id of the scene in the library.
         scene: String,
     },
+    /// Read the folder of scenes again.
+    List {},
+    /// Run a text as a scene. What the page has set before is forgotten.
+    Try {
+        /// Name of the scene's file, for messages.
+        name: String,
+        /// The text.
+        text: String,
+    },
     /// Keep a copy of the run, to be shown beside others.
     Pin {
         /// Name of the pinned run.
@@ -116,7 +125,7 @@ impl Mode {
 pub struct State<'a> {
     /// State of the run.
     pub mode: Mode,
-    /// Id of the scene in the library.
+    /// Id of the scene in the library, or of the edited text: `text:<name>`.
     pub scene: &'a str,
     /// Name of the scene.
     pub title: &'a str,
@@ -181,6 +190,8 @@ pub struct RunState {
     pub points: usize,
     /// Number of the present step.
     pub step: u64,
+    /// Step of the last frame that has a picture.
+    pub picture: Option<u64>,
     /// Simulated time (s).
     pub time: f64,
     /// End time of the scene (s).

@@ -2,12 +2,15 @@
 
 use super::live::Live;
 use super::protocol::{Mode, SavedState};
+use crate::light::reel::Detail;
+use crate::light::report::{self, ReportError};
 use crate::record::folder::{self, FolderError};
 use crate::record::plots::PlotError;
 use crate::record::rerun_log::{RecordError, RerunLog, Sink};
 use crate::record::run_plots::plots_of_run;
 use crate::record::series::SeriesWriter;
 use crate::record::summary::{Ending, Summary, Tally};
+use crate::results::{Member, ResultsError};
 use crate::scene::{is_folder_name, to_toml};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +35,12 @@ pub enum SaveError {
     /// A plot cannot be written.
     #[error(transparent)]
     Plot(#[from] PlotError),
+    /// The files cannot be read back for the report.
+    #[error(transparent)]
+    Read(#[from] ResultsError),
+    /// The report cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
     /// A file cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
     Write {
@@ -94,6 +103,9 @@ pub fn keep(
     );
     summary.write(&folder).map_err(SaveError::Summary)?;
     plots_of_run(&folder, &live.drive.plan, &live.rows)?;
+    let page = at("report.html");
+    let command = format!("grainscope report {}", folder.display());
+    report::write(&[Member::open(&folder)?], Detail::default(), &page, &command)?;
     claimed.settle(true);
     let files = folder::FILES.iter().filter_map(|name| {
         let size = std::fs::metadata(at(name)).ok()?.len();

@@ -1,12 +1,14 @@
 //! This module serves the page of the explorer, behind the guard of [`crate::web`]. Pages choose
 //! scenes and files from lists of the session and never give paths.
 
+use super::editor::{Desk, Edit, MAX_SCENE};
 use super::protocol::{Answer, Command};
 use super::session::Request as Order;
 use super::status::Status;
+use crate::light;
 use crate::record::rerun_log::with_viewer;
 use crate::web::connections::{CLIENT_PATIENCE, accept};
-use crate::web::guard::{Guard, MAX_BODY};
+use crate::web::guard::Guard;
 use crate::web::{file, kind};
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
@@ -16,6 +18,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use crossbeam::channel::Sender;
 use futures::future;
+use serde::de::DeserializeOwned;
 use std::convert::Infallible;
 use std::net::TcpListener;
 use std::pin::pin;
@@ -30,6 +33,8 @@ const PAGE: &str = include_str!("../../assets/explorer/index.html");
 const STYLE: &str = include_str!("../../assets/explorer/style.css");
 const SCRIPT: &str = include_str!("../../assets/explorer/explorer.js");
 const PLOTS: &str = include_str!("../../assets/explorer/plots.js");
+const EDITOR: &str = include_str!("../../assets/editor/editor.js");
+const SCENE_SCRIPT: &str = include_str!("../../assets/explorer/scene.js");
 const VIEWER: &str = include_str!("../../assets/explorer/viewer.html");
 const VIEWER_SCRIPT: &str = include_str!("../../assets/explorer/viewer.js");
 const ICON: &str = include_str!("../../assets/explorer/icon.svg");
@@ -40,6 +45,8 @@ pub struct Site {
     pub commands: Sender<Order>,
     /// Data that the session publishes.
     pub status: Arc<Status>,
+    /// Scenes that the page edits.
+    pub desk: Desk,
 }
 
 type Shared = State<Arc<Site>>;
@@ -53,6 +60,12 @@ pub fn routes(guard: Arc<Guard>, site: Site) -> Option<Router> {
         .route("/style.css", file(kind::STYLE, STYLE.as_bytes()))
         .route("/explorer.js", file(kind::SCRIPT, SCRIPT.as_bytes()))
         .route("/plots.js", file(kind::SCRIPT, PLOTS.as_bytes()))
+        .route("/base.css", file(kind::STYLE, light::BASE_STYLE.as_bytes()))
+        .route("/light.css", file(kind::STYLE, light::STYLE.as_bytes()))
+        .route("/light/frame.js", file(kind::SCRIPT, light::DRAWING[0].as_bytes()))
+        .route("/light/painter.js", file(kind::SCRIPT, light::DRAWING[1].as_bytes()))
+        .route("/light/canvas.js", file(kind::SCRIPT, light::CANVAS.as_bytes()))
+        .route("/light/view.js", file(kind::SCRIPT, light::VIEW.as_bytes()))
         .route("/icon.svg", file(kind::SVG, ICON.as_bytes()))
         .route("/viewer/", file(kind::HTML, VIEWER.as_bytes()))
         .nest("/viewer", with_viewer(viewer)?)
@@ -60,7 +73,13 @@ pub fn routes(guard: Arc<Guard>, site: Site) -> Option<Router> {
         .route("/api/state", get(state))
         .route("/api/events", get(events))
         .route("/api/curves", get(curves))
-        .route("/api/sketch", get(sketch))
+        .route("/api/runs/{id}", get(listing))
+        .route("/api/runs/{id}/{step}", get(picture))
+        .route("/editor.js", file(kind::SCRIPT, EDITOR.as_bytes()))
+        .route("/scene.js", file(kind::SCRIPT, SCENE_SCRIPT.as_bytes()))
+        .route("/api/schema", get(schema))
+        .route("/api/scene/{id}", get(scene))
+        .route("/api/editor", post(edit))
         .route("/api/command", post(command))
         .route("/api/saved/{folder}/{file}", get(saved));
     Some(guard.protect(page(), inside, Arc::new(site)))
@@ -127,46 +146,95 @@ async fn stream(State(site): Shared, Path(name): Path<String>) -> Response {
     }
 }
 
-async fn sketch(State(site): Shared) -> Response {
-    match site.status.drawn().map(|s| serde_json::to_string(&s)) {
+/// Constant data of a run and the steps that have pictures.
+async fn listing(State(site): Shared, Path(id): Path<u64>) -> Response {
+    match site.status.listing(id).map(|l| serde_json::to_string(&l)) {
         Some(Ok(text)) => json(text),
-        _ => (StatusCode::NOT_FOUND, "there is no picture yet\n").into_response(),
+        _ => (StatusCode::NOT_FOUND, "there is no such run\n").into_response(),
     }
 }
 
-async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Response {
-    let refuse = |code: StatusCode, answer: Answer| {
-        let text = serde_json::to_string(&answer).unwrap_or_default();
-        (code, [(header::CONTENT_TYPE, "application/json")], text).into_response()
+/// The packed picture of a step.
+async fn picture(State(site): Shared, Path((id, step)): Path<(u64, u64)>) -> Response {
+    let packed = tokio::task::spawn_blocking(move || site.status.picture(id, step)).await;
+    match packed {
+        Ok(Some(bytes)) => {
+            ([(header::CONTENT_TYPE, "application/octet-stream")], bytes).into_response()
+        }
+        _ => (StatusCode::NOT_FOUND, "there is no such picture\n").into_response(),
+    }
+}
+
+/// The schema of scenes, for completion and help.
+async fn schema() -> Response {
+    json(crate::scene::json_schema())
+}
+
+/// The text of a scene of the library.
+async fn scene(State(site): Shared, Path(id): Path<String>) -> Response {
+    let opened = tokio::task::spawn_blocking(move || site.desk.open(&id)).await;
+    match opened.map(|o| o.map(|o| serde_json::to_string(&o))) {
+        Ok(Some(Ok(text))) => json(text),
+        _ => (StatusCode::NOT_FOUND, "there is no such scene\n").into_response(),
+    }
+}
+
+/// A request of the editor. It is answered beside the session, so it does not wait for a step.
+async fn edit(State(site): Shared, headers: HeaderMap, body: Body) -> Response {
+    let order: Edit = match read(&headers, body, MAX_SCENE).await {
+        Ok(order) => order,
+        Err(refusal) => return refusal,
     };
+    let answer = tokio::task::spawn_blocking(move || site.desk.obey(order, &site.status)).await;
+    match answer.map(|a| serde_json::to_string(&a)) {
+        Ok(Ok(text)) => json(text),
+        _ => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
+    }
+}
+
+fn refuse(code: StatusCode, answer: &Answer) -> Response {
+    let text = serde_json::to_string(answer).unwrap_or_default();
+    (code, [(header::CONTENT_TYPE, "application/json")], text).into_response()
+}
+
+/// Reads a JSON body of at most `most` bytes.
+async fn read<T: DeserializeOwned>(
+    headers: &HeaderMap,
+    body: Body,
+    most: usize,
+) -> Result<T, Response> {
     // Forms of other sites cannot send this content type.
     let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok());
     if !kind.is_some_and(|k| k.starts_with("application/json")) {
         let answer = Answer::no("a command must be JSON", "send it as application/json");
-        return refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, answer);
+        return Err(refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, &answer));
     }
-    let body = match tokio::time::timeout(CLIENT_PATIENCE, to_bytes(body, MAX_BODY)).await {
+    let body = match tokio::time::timeout(CLIENT_PATIENCE, to_bytes(body, most)).await {
         Ok(Ok(body)) => body,
-        Ok(Err(_)) => return StatusCode::PAYLOAD_TOO_LARGE.into_response(),
-        Err(_) => return StatusCode::REQUEST_TIMEOUT.into_response(),
+        Ok(Err(_)) => return Err(StatusCode::PAYLOAD_TOO_LARGE.into_response()),
+        Err(_) => return Err(StatusCode::REQUEST_TIMEOUT.into_response()),
     };
-    let command: Command = match serde_json::from_slice(&body) {
+    serde_json::from_slice(&body).map_err(|e| {
+        let answer = Answer::no(format!("this is not a command: {e}"), "");
+        refuse(StatusCode::BAD_REQUEST, &answer)
+    })
+}
+
+async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Response {
+    let command: Command = match read(&headers, body, MAX_SCENE).await {
         Ok(command) => command,
-        Err(e) => {
-            let answer = Answer::no(format!("this is not a command: {e}"), "");
-            return refuse(StatusCode::BAD_REQUEST, answer);
-        }
+        Err(refusal) => return refusal,
     };
     let (reply, answer) = oneshot::channel();
     if site.commands.try_send(Order { command, reply }).is_err() {
         let answer = Answer::no("too many commands are waiting", "wait for the step to end");
-        return refuse(StatusCode::SERVICE_UNAVAILABLE, answer);
+        return refuse(StatusCode::SERVICE_UNAVAILABLE, &answer);
     }
     match answer.await {
-        Ok(answer) => refuse(StatusCode::OK, answer),
+        Ok(answer) => refuse(StatusCode::OK, &answer),
         Err(_) => {
             let answer = Answer::no("the session has ended", "start grainscope again");
-            refuse(StatusCode::SERVICE_UNAVAILABLE, answer)
+            refuse(StatusCode::SERVICE_UNAVAILABLE, &answer)
         }
     }
 }

@@ -39,9 +39,6 @@ const LOOK_UP: Duration = Duration::from_millis(200);
 const FAREWELL: Duration = Duration::from_secs(5);
 /// Number of replaced recordings that are served at most; each has threads and memory of its own.
 const MOST_RETIRED: usize = 2;
-/// Exponent of the growth of the step time with the number of unknowns, between those of assembly
-/// and factorisation.
-const STEP_GROWTH: f64 = 1.3;
 /// Exponent of the growth of the solver time with the number of unknowns.
 const SOLVER_GROWTH: f64 = 1.5;
 /// Number of steps after which the step time is remembered.
@@ -146,9 +143,12 @@ impl Session {
                 }
                 Ok(Request { command, reply }) => {
                     let asks = matches!(command, Command::Ask { .. });
+                    let silent = asks || matches!(command, Command::List {});
                     let answer = self.obey(command);
-                    if !asks {
+                    if !silent {
                         self.tell(answer.accepted, &answer.message);
+                    }
+                    if !asks {
                         self.publish();
                     }
                     let _ = reply.send(answer);
@@ -177,6 +177,11 @@ impl Session {
     fn obey(&mut self, command: Command) -> Answer {
         match command {
             Command::Load { scene } => return self.load(&scene),
+            Command::List {} => {
+                self.library.look();
+                return Answer::yes("the list of scenes is up to date");
+            }
+            Command::Try { name, text } => return self.try_text(&name, text),
             Command::Unpin { name } => return self.unpin(&name),
             Command::Quit {} => return Answer::yes("grainscope ends"),
             _ => {}
@@ -222,9 +227,11 @@ impl Session {
             Command::Ask { key, value } => self.ask(&key, &value),
             Command::Pin { name } => self.pin(&name),
             Command::Save { name } => self.save(&name),
-            Command::Load { .. } | Command::Unpin { .. } | Command::Quit {} => {
-                Answer::no("this was answered above", "")
-            }
+            Command::Load { .. }
+            | Command::List {}
+            | Command::Try { .. }
+            | Command::Unpin { .. }
+            | Command::Quit {} => Answer::no("this was answered above", ""),
         }
     }
 
@@ -265,7 +272,7 @@ impl Session {
 
     fn show(&mut self, frame: &Arc<Frame>) {
         if let Some(live) = self.live.as_ref().filter(|_| frame.snapshot.is_some()) {
-            self.status.sketch(&live.info, frame.clone());
+            self.status.film(live.id, &live.info, live.frames.frames());
         }
         if self.stage.as_mut().is_some_and(|stage| !stage.show(frame)) {
             self.set_stage();

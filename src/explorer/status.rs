@@ -1,7 +1,10 @@
-//! This module holds the data that pages read: state as JSON, curves, a sketch and saved files. The
+//! This module holds the data that pages read: state as JSON, curves, frames and saved files. The
 //! session writes it, and the server can read it at any time.
 
-use crate::frame::{Frame, RunInfo};
+use super::knobs::STEP_GROWTH;
+use crate::frame::{Frame, RunInfo, Snapshot};
+use crate::light::Description;
+use crate::light::pack::{pack, thin};
 use crate::plan::Plan;
 use crate::sim::row::{Place, Row, places};
 use crate::web::stream::Stream;
@@ -38,28 +41,34 @@ pub struct Status {
     state: watch::Sender<Arc<str>>,
     curves: Mutex<HashMap<u64, Curves>>,
     files: Mutex<HashMap<(String, String), PathBuf>>,
-    sketch: Mutex<Option<(RunInfo, Arc<Frame>)>>,
+    films: Mutex<HashMap<u64, Film>>,
+    /// Number of unknowns and step time (s) of the run.
+    pace: Mutex<Option<(usize, f64)>>,
     /// Address of the streams, to which their names are appended.
     streams_at: String,
     streams: Mutex<HashMap<String, Arc<Stream>>>,
 }
 
-/// Maximum number of particles in a sketch.
-const SKETCH_POINTS: usize = 20_000;
+/// Maximum number of particles in a frame of the light view.
+const MOST_PARTICLES: usize = 20_000;
 
-/// A simplified snapshot, shown until the viewer has loaded.
+/// The frames of a run that have pictures.
+struct Film {
+    info: RunInfo,
+    frames: Vec<Arc<Frame>>,
+}
+
+/// What the light view gets of a run.
 #[derive(Debug, Serialize)]
-pub struct Sketch {
-    /// Number of the step.
-    pub step: u64,
-    /// Lower left and upper right corner of the domain (m).
-    pub domain: [[f32; 2]; 2],
-    /// Polylines of the walls (m).
-    pub walls: Vec<Vec<[f32; 2]>>,
-    /// Polylines of the dye (m).
-    pub dye: Vec<Vec<[f32; 2]>>,
-    /// Colour and particle positions (m) of each material.
-    pub grains: Vec<([u8; 3], Vec<[f32; 2]>)>,
+pub struct Listing {
+    /// Number of the run.
+    pub id: u64,
+    /// Constant data of the run.
+    pub description: Description,
+    /// Steps of the frames that have pictures.
+    pub steps: Vec<u64>,
+    /// Their times (s).
+    pub times: Vec<f64>,
 }
 
 impl Status {
@@ -69,7 +78,8 @@ impl Status {
             state: watch::Sender::new("null".into()),
             curves: Mutex::default(),
             files: Mutex::default(),
-            sketch: Mutex::default(),
+            films: Mutex::default(),
+            pace: Mutex::default(),
             streams_at,
             streams: Mutex::default(),
         }
@@ -114,36 +124,58 @@ impl Status {
         }
     }
 
-    /// Removes the curves of a run.
+    /// Removes the curves and frames of a run.
     pub fn forget(&self, run: u64) {
+        lock(&self.films).remove(&run);
         lock(&self.curves).remove(&run);
     }
 
-    /// Keeps the last snapshot, from which the sketch is made.
-    pub fn sketch(&self, info: &RunInfo, frame: Arc<Frame>) {
-        *lock(&self.sketch) = Some((info.clone(), frame));
+    /// Publishes the frames of a run, of which only those with pictures are kept.
+    pub fn film(&self, run: u64, info: &RunInfo, frames: &[Arc<Frame>]) {
+        let drawn = frames.iter().filter(|f| f.snapshot.is_some()).cloned().collect();
+        let mut films = lock(&self.films);
+        let film = films.entry(run).or_insert_with(|| Film { info: info.clone(), frames: vec![] });
+        film.frames = drawn;
     }
 
-    /// The sketch of the last snapshot; `None` if there is no snapshot.
-    pub fn drawn(&self) -> Option<Sketch> {
-        let (info, frame) = lock(&self.sketch).clone()?;
-        let snapshot = frame.snapshot.as_ref()?;
-        let particles = &snapshot.particles;
-        let every = particles.positions.len().div_ceil(SKETCH_POINTS).max(1);
-        let mut grains: Vec<_> = info.materials.iter().map(|m| (m.rgb, vec![])).collect();
-        let both = particles.positions.iter().zip(&particles.class).step_by(every);
-        for (place, class) in both {
-            if let Some((_, places)) = grains.get_mut(usize::from(*class)) {
-                places.push(*place);
-            }
-        }
-        Some(Sketch {
-            step: frame.step,
-            domain: [info.domain.min, info.domain.max],
-            walls: info.walls.into_iter().map(|w| w.points).collect(),
-            dye: snapshot.dye_lines.clone(),
-            grains,
+    /// What the light view gets of a run; `None` if the run is unknown.
+    pub fn listing(&self, run: u64) -> Option<Listing> {
+        let films = lock(&self.films);
+        let film = films.get(&run)?;
+        Some(Listing {
+            id: run,
+            description: Description::new(&film.info),
+            steps: film.frames.iter().map(|f| f.step).collect(),
+            times: film.frames.iter().map(|f| f.time_s).collect(),
         })
+    }
+
+    /// The packed picture of a step, thinned; `None` if there is none.
+    pub fn picture(&self, run: u64, step: u64) -> Option<Vec<u8>> {
+        let (info, frame) = {
+            let films = lock(&self.films);
+            let film = films.get(&run)?;
+            let frame = film.frames.iter().rev().find(|f| f.step == step)?;
+            (film.info.clone(), frame.clone())
+        };
+        let snapshot = frame.snapshot.as_ref()?;
+        if snapshot.particles.positions.len() <= MOST_PARTICLES {
+            return Some(pack(snapshot, &info));
+        }
+        let particles = thin(&snapshot.particles, MOST_PARTICLES);
+        Some(pack(&Snapshot { particles, ..snapshot.clone() }, &info))
+    }
+
+    /// Notes the number of unknowns and the step time (s) of the run.
+    pub fn set_pace(&self, unknowns: usize, seconds_per_step: f64) {
+        *lock(&self.pace) = Some((unknowns, seconds_per_step));
+    }
+
+    /// Expected step time (s) of a scene with this number of unknowns; `None` if no run was timed.
+    pub fn expected_step(&self, unknowns: usize) -> Option<f64> {
+        let (of, seconds) = (*lock(&self.pace))?;
+        let expected = seconds * (unknowns as f64 / of as f64).powf(STEP_GROWTH);
+        expected.is_finite().then_some(expected)
     }
 
     /// Makes a stream available to the viewer, and returns its address.

@@ -1,12 +1,14 @@
-//! This module exports the pictures of a recording: VTK files (ParaView) and CSV tables.
+//! This module exports the pictures of a recording: VTK files (ParaView), CSV and Parquet tables.
 //!
 //! Each frame has a file with the particles and a file with the fields, with the same number.
 
+mod columns;
 mod tables;
 mod vtu;
 
 use crate::frame::{GridField, ParticleSnapshot};
 use crate::record::replace::{self, Kind, ReplaceError};
+use crate::results::table::Table;
 use crate::results::{Member, ResultsError, SAME_TIME};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,6 +28,14 @@ pub enum ExportError {
     /// A file is in the way, or cannot be written.
     #[error(transparent)]
     Replace(#[from] ReplaceError),
+    /// A table cannot be encoded.
+    #[error("{} cannot be encoded: {source}", path.display())]
+    Encode {
+        /// Path of the table.
+        path: PathBuf,
+        /// Error of the encoder.
+        source: parquet::errors::ParquetError,
+    },
     /// The folder cannot be made.
     #[error("cannot write {}: {source}", path.display())]
     Write {
@@ -43,6 +53,8 @@ pub enum Format {
     Vtu,
     /// Comma-separated tables.
     Csv,
+    /// Parquet tables, for data frames.
+    Parquet,
 }
 
 /// Particles and fields at one instant.
@@ -63,6 +75,8 @@ pub struct Frames {
     pub instants: Vec<Instant>,
     /// Material names; the class of a particle is an index into them.
     pub materials: Vec<String>,
+    /// The series of the run; `None` if there is none.
+    pub series: Option<Table>,
 }
 
 /// Reads the pictures of a run from its folder or a recording.
@@ -73,6 +87,7 @@ pub fn read(run: &Path) -> Result<Frames, ExportError> {
     };
     let mut frames = Frames {
         materials: info.materials.iter().map(|m| m.name.clone()).collect(),
+        series: member.table.clone(),
         ..Frames::default()
     };
     for (time, particles) in recorded.particles() {
@@ -100,6 +115,7 @@ pub fn write(frames: &Frames, format: Format, folder: &Path) -> Result<usize, Ex
     match format {
         Format::Vtu => vtu::write(frames, folder),
         Format::Csv => tables::write(frames, folder),
+        Format::Parquet => columns::write(frames, folder),
     }
 }
 

@@ -345,7 +345,11 @@ mod tests {
     fn rectangles_cover_the_particles() {
         let domain = Rect { min: [0.0, 0.0], max: [4.0, 4.0] };
         let positions = vec![[0.5, 0.5], [1.5, 0.5], [0.5, 1.5], [1.5, 1.5], [3.5, 3.5]];
-        let particles = ParticleSnapshot { positions, class: vec![0, 0, 0, 0, 1], scalar: None };
+        let particles = ParticleSnapshot {
+            positions,
+            class: vec![0, 0, 0, 0, 1],
+            ..ParticleSnapshot::default()
+        };
         let cover = Cover::new(&particles, domain, [4, 4], 0.5);
         let mut found = cover.rectangles();
         found.sort();

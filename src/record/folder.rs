@@ -52,7 +52,7 @@ pub const SCENE: &str = "scene.toml";
 pub const NOTE: &str = "case.json";
 
 /// Files that a run writes. `--force` replaces these and the checkpoints, and nothing else.
-pub const FILES: [&str; 10] = [
+pub const FILES: [&str; 11] = [
     "recording.rrd",
     "series.csv",
     "summary.json",
@@ -63,6 +63,7 @@ pub const FILES: [&str; 10] = [
     "diagnostics.png",
     "alignment.svg",
     "alignment.png",
+    "report.html",
 ];
 
 /// Upper bound of the number that is appended to a taken name.

@@ -198,6 +198,10 @@ pub struct RerunLog {
     checked: Instant,
     /// Class numbers as last recorded; they are recorded again only when they change.
     classes: Vec<u16>,
+    /// Radii as last recorded, likewise.
+    radii: Vec<f32>,
+    /// Radius of particles without a radius of their own (m).
+    particle_radius: f32,
     /// Whether the particles were last coloured by a scalar.
     colored: bool,
     /// Colour scales as last recorded, by the entity of the field.
@@ -285,6 +289,8 @@ impl RerunLog {
             notices: Vec::new(),
             checked: Instant::now(),
             classes: Vec::new(),
+            radii: Vec::new(),
+            particle_radius: info.particle_radius,
             colored: false,
             scales: HashMap::new(),
             isolines: HashSet::new(),

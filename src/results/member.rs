@@ -1,46 +1,16 @@
 //! This module reads a run back from its folder, a recording or a summary.
 
-use super::later;
+use super::summary::{Summary, read};
 use super::table::{SECONDS, Table};
+use super::{ResultsError, later};
 use crate::frame::RunInfo;
 use crate::record::folder::FILES;
 use crate::record::info::run_info;
-use crate::record::rerun_log::{ReadError, Recorded};
-use crate::scene::{self, SceneError, SceneSource, scene_hash};
+use crate::record::rerun_log::Recorded;
+use crate::scene::{self, SceneSource, scene_hash};
 use indexmap::IndexMap;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
-
-/// Error of reading runs back.
-#[derive(Debug, thiserror::Error)]
-pub enum ResultsError {
-    /// The path does not exist.
-    #[error("{}: there is no such file or folder; give a run's folder, a recording (.rrd) or a summary.json", .0.display())]
-    Missing(PathBuf),
-    /// The folder contains no run.
-    #[error("{}: holds no run; expected {} in it", .0.display(), FILES[..4].join(", "))]
-    NoRun(PathBuf),
-    /// The file is neither a recording nor a summary.
-    #[error("{}: is neither a recording (.rrd) nor a summary (.json)", .0.display())]
-    Unknown(PathBuf),
-    /// The content of a file is not valid.
-    #[error("{}: {cause}", path.display())]
-    Broken {
-        /// Path of the file.
-        path: PathBuf,
-        /// Description of the error.
-        cause: String,
-    },
-    /// The recording cannot be read.
-    #[error(transparent)]
-    Recording(#[from] ReadError),
-    /// The scene of the run is not valid.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The arguments are not valid.
-    #[error("{0}")]
-    Usage(String),
-}
 
 /// Kind of data from which a run was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -52,36 +22,6 @@ pub enum Kind {
     Recording,
     /// A summary alone, which has values at the end only.
     Summary,
-}
-
-/// The parts of `summary.json` that are read.
-#[derive(Clone, Debug, Deserialize)]
-struct Summary {
-    schema: u32,
-    scene: String,
-    scene_hash: String,
-    state_hash: String,
-    ending: String,
-    #[serde(default)]
-    error: Option<String>,
-    steps: u64,
-    time: f64,
-    // JSON has null for numbers that are not finite.
-    max_speed: Option<f64>,
-    rms_speed: Option<f64>,
-    particles: u64,
-    gauges: IndexMap<String, Gauge>,
-    volume_drift: IndexMap<String, Option<f64>>,
-    #[serde(default)]
-    mean_alignment: Option<f64>,
-    #[serde(default)]
-    recording: Option<PathBuf>,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-struct Gauge {
-    volume: Option<f64>,
-    rate: Option<f64>,
 }
 
 /// A run that was read.
@@ -117,6 +57,11 @@ pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Member>, ResultsError> {
                 .into(),
         ));
     }
+    open_each(paths)
+}
+
+/// Reads one or more runs and gives them different names.
+pub fn open_each(paths: &[PathBuf]) -> Result<Vec<Member>, ResultsError> {
     let mut members: Vec<Member> = vec![];
     for path in paths {
         let member = Member::open(path)?;
@@ -299,6 +244,11 @@ impl Member {
         }
     }
 
+    /// Content of `summary.json`; `None` if there is none.
+    pub fn summary_json(&self) -> Option<serde_json::Value> {
+        self.summary.as_ref().map(|s| s.whole.clone())
+    }
+
     /// SHA-256 of the final state, hexadecimal; `None` if unknown.
     pub fn state_hash(&self) -> Option<&str> {
         self.summary.as_ref().map(|s| s.state_hash.as_str())
@@ -331,54 +281,6 @@ impl Member {
         }
         Some(values)
     }
-}
-
-impl Summary {
-    fn read(path: &Path) -> Result<Summary, ResultsError> {
-        let broken = |cause: String| ResultsError::Broken { path: path.to_owned(), cause };
-        let summary: Summary = serde_json::from_str(&read(path)?).map_err(|e| {
-            broken(format!(
-                "is not the summary of a run: {e}; expected a summary.json of `grainscope run`"
-            ))
-        })?;
-        if summary.schema != crate::record::summary::SCHEMA {
-            return Err(broken(format!(
-                "has schema {}; this program reads {}: create it again with `grainscope run`",
-                summary.schema,
-                crate::record::summary::SCHEMA
-            )));
-        }
-        Ok(summary)
-    }
-
-    /// Values under the column names of the series.
-    fn values(&self) -> IndexMap<String, f64> {
-        let mut values = IndexMap::new();
-        let mut put = |key: &str, value: Option<f64>| {
-            values.extend(value.map(|value| (key.to_string(), value)));
-        };
-        put("step", Some(self.steps as f64));
-        put("particles", Some(self.particles as f64));
-        for (name, gauge) in &self.gauges {
-            let prefix = if self.gauges.len() > 1 { format!("{name}.") } else { String::new() };
-            put(&format!("{prefix}outflow_volume"), gauge.volume);
-            put(&format!("{prefix}outflow_rate"), gauge.rate);
-        }
-        put("max_speed", self.max_speed);
-        put("rms_speed", self.rms_speed);
-        put("mean_alignment", self.mean_alignment);
-        for (material, drift) in &self.volume_drift {
-            put(&format!("{material}.volume_drift"), *drift);
-        }
-        values
-    }
-}
-
-fn read(path: &Path) -> Result<String, ResultsError> {
-    std::fs::read_to_string(path).map_err(|e| ResultsError::Broken {
-        path: path.to_owned(),
-        cause: format!("cannot be read: {e}"),
-    })
 }
 
 /// Name of a folder, also for `.`.

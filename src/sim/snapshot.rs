@@ -3,9 +3,11 @@
 
 mod raster;
 
+use super::initial::Unfilled;
 use super::simulation::Simulation;
 use crate::frame::{Arrows, GridField, ParticleScalar, ParticleSnapshot, Snapshot};
 use crate::laws::director;
+use crate::motion::tracers::DyeLines;
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName};
 use crate::space::flow::{gradient, interpolate};
@@ -35,6 +37,54 @@ pub fn drawn(plan: &Plan, particles: &Particles) -> Vec<usize> {
     (0..particles.len()).filter(|&p| Some(particles.material[p]) != background).collect()
 }
 
+/// The picture of the initial state, without its flow: particles and dye lines.
+///
+/// # Errors
+/// A point of the domain lies in no region, and there is no background material.
+pub fn initial(plan: &Plan) -> Result<Snapshot, Unfilled> {
+    let (all, _) = super::initial::particles(plan)?;
+    let dye = plan.tracers.as_ref().map(DyeLines::new);
+    Ok(Snapshot {
+        particles: particles(plan, &all).0,
+        dye_lines: dye.map_or(vec![], |d| dye_lines(plan, &d)),
+        ..Snapshot::default()
+    })
+}
+
+/// The particles to draw, without a quantity, and their indices.
+fn particles(plan: &Plan, all: &Particles) -> (ParticleSnapshot, Vec<usize>) {
+    let shown = drawn(plan, all);
+    let every = thinning(plan, shown.len());
+    let shown: Vec<usize> = shown.into_iter().step_by(every).collect();
+    let marked = plan.state.materials.len() as u16;
+    let class = |&p: &usize| match &all.mark {
+        Some(m) if m[p] => marked,
+        _ => u16::from(all.material[p]),
+    };
+    let position = |&p: &usize| plan.si(all.position[p]).map(|c| c as f32);
+    let picture = ParticleSnapshot {
+        positions: shown.iter().map(position).collect(),
+        class: shown.iter().map(class).collect(),
+        radii: shown.iter().map(|&p| drawn_radius(plan, all.volume[p] * every as f64)).collect(),
+        scalar: None,
+    };
+    (picture, shown)
+}
+
+/// Radius at which a particle of a volume (dimensionless) is drawn (m): half the diagonal of a
+/// square of this volume, in steps of 9 %, so that recordings compress well.
+fn drawn_radius(plan: &Plan, volume: f64) -> f32 {
+    const STEPS: f64 = 8.0;
+    let radius = (0.5 * volume).sqrt() * plan.units.length;
+    ((radius.log2() * STEPS).round() / STEPS).exp2() as f32
+}
+
+/// Dye lines as polylines (m).
+fn dye_lines(plan: &Plan, dye: &DyeLines) -> Vec<Vec<[f32; 2]>> {
+    let si = |p: &[f64; 2]| plan.si(*p).map(|c| c as f32);
+    dye.wrapped(&plan.mesh).iter().map(|l| l.iter().map(si).collect()).collect()
+}
+
 impl<const D: usize> Simulation<D> {
     pub(super) fn draw(&self) -> Snapshot {
         let plan = &self.plan;
@@ -47,10 +97,7 @@ impl<const D: usize> Simulation<D> {
             .collect();
         Snapshot {
             particles: self.draw_particles(),
-            dye_lines: self.dye.as_ref().map_or(vec![], |d| {
-                let si = |p: &[f64; 2]| plan.si(*p).map(|c| c as f32);
-                d.wrapped(&plan.mesh).iter().map(|l| l.iter().map(si).collect()).collect()
-            }),
+            dye_lines: self.dye.as_ref().map_or(vec![], |d| dye_lines(plan, d)),
             glyphs: self.glyphs(),
             arrows: fields.iter().any(|f| f.name == "speed").then(|| self.arrows()),
             fields,
@@ -59,23 +106,9 @@ impl<const D: usize> Simulation<D> {
     }
 
     fn draw_particles(&self) -> ParticleSnapshot {
-        let plan = &self.plan;
-        let all = drawn(plan, &self.particles);
-        let every = thinning(plan, all.len());
-        let shown: Vec<usize> = all.into_iter().step_by(every).collect();
-        let marked = plan.state.materials.len() as u16;
-        let class = |&p: &usize| match &self.particles.mark {
-            Some(m) if m[p] => marked,
-            _ => u16::from(self.particles.material[p]),
-        };
-        ParticleSnapshot {
-            positions: shown
-                .iter()
-                .map(|&p| plan.si(self.particles.position[p]).map(|c| c as f32))
-                .collect(),
-            class: shown.iter().map(class).collect(),
-            scalar: self.particle_scalar(&shown),
-        }
+        let (mut picture, shown) = particles(&self.plan, &self.particles);
+        picture.scalar = self.particle_scalar(&shown);
+        picture
     }
 
     fn particle_scalar(&self, shown: &[usize]) -> Option<ParticleScalar> {

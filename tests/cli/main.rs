@@ -7,6 +7,7 @@ mod environment;
 mod hostile;
 mod keeping;
 mod killed;
+mod light;
 mod recording;
 mod refusals;
 mod resume;

@@ -148,7 +148,8 @@ fn info() -> RunInfo {
 
 fn frame(step: u64) -> Frame {
     let positions = (0..2000).map(|i| [i as f32 / 2000.0, 0.1 * step as f32]).collect();
-    let particles = ParticleSnapshot { positions, class: vec![0; 2000], scalar: None };
+    let particles =
+        ParticleSnapshot { positions, class: vec![0; 2000], ..ParticleSnapshot::default() };
     Frame {
         step,
         time_s: step as f64,

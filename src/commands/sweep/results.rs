@@ -1,9 +1,12 @@
 //! Collects and compares the cases of a sweep.
 
+use super::super::report::write as write_report;
 use super::super::{Failure, compare as comparison, print};
 use super::*;
 use crate::compare;
+use crate::light::reel::Detail;
 use crate::record::rerun_log::Sink;
+use crate::results::Member;
 use crate::sweep::collect::Collection;
 use crate::sweep::{Case, List, State, Store};
 use std::path::PathBuf;
@@ -14,6 +17,7 @@ pub(super) fn collect(
     store: &Store,
     list: &List,
     side_by_side: Option<&[String]>,
+    report: bool,
 ) -> Result<(), Failure> {
     let found = Collection::new(store, list)?;
     let mut files = found.write_tables(store.root())?;
@@ -24,12 +28,17 @@ pub(super) fn collect(
     }
     let mut text = found.terminal();
     text += &format!("\n{} of {} cases are done\n", found.done(), list.cases.len());
-    if let Some(named) = side_by_side {
-        let cases =
-            if named.is_empty() { of_first_seed(store, list) } else { chosen(list, named)? };
-        if cases.len() > 1 {
-            files.push(beside(store, &cases)?);
-        }
+    let cases = match side_by_side {
+        Some(named) if !named.is_empty() => chosen(list, named)?,
+        _ => of_first_seed(store, list),
+    };
+    if side_by_side.is_some() && cases.len() > 1 {
+        files.push(beside(store, &cases)?);
+    }
+    if report && !cases.is_empty() {
+        let page = store.root().join("report.html");
+        write_report(&members(store, &cases)?, Detail::default(), &page)?;
+        files.push(page);
     }
     for file in files {
         text += &format!("wrote {}\n", file.display());
@@ -49,13 +58,19 @@ pub(super) fn of_first_seed<'a>(store: &Store, list: &'a List) -> Vec<&'a Case> 
     done.take(MOST_SIDE_BY_SIDE).collect()
 }
 
-/// Writes one recording and plots of some cases, compared with the first of them.
-pub(super) fn beside(store: &Store, cases: &[&Case]) -> Result<PathBuf, Failure> {
+/// Reads the runs of cases, which are named by their parameters.
+fn members(store: &Store, cases: &[&Case]) -> Result<Vec<Member>, Failure> {
     let folders: Vec<PathBuf> = cases.iter().map(|c| store.done(&c.id)).collect();
-    let mut members = crate::results::open_all(&folders)?;
+    let mut members = crate::results::open_each(&folders)?;
     for (member, case) in members.iter_mut().zip(cases) {
         member.rename(&case.label());
     }
+    Ok(members)
+}
+
+/// Writes one recording and plots of some cases, compared with the first of them.
+pub(super) fn beside(store: &Store, cases: &[&Case]) -> Result<PathBuf, Failure> {
+    let members = members(store, cases)?;
     let path = store.root().join("side_by_side.rrd");
     let found = compare::compare(&members, &[])?;
     comparison::write(found, &members, &path, &[Sink::Save(path.clone())])?;

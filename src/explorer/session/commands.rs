@@ -31,6 +31,17 @@ impl Session {
         }
     }
 
+    /// Starts the text of the editor as a scene.
+    pub(super) fn try_text(&mut self, name: &str, text: String) -> Answer {
+        self.library.look();
+        let mode = self.mode_of_next();
+        let source = SceneSource::new(name, text);
+        match self.begin_scene(&format!("text:{name}"), source, mode) {
+            Ok(()) => Answer::yes(format!("runs {name} as it is written")).restarting(),
+            Err(e) => Answer::no(e.headline(), e.remedy().unwrap_or("see the errors in the text")),
+        }
+    }
+
     /// Starts a scene. If it has errors, the present run is kept.
     pub(super) fn begin_scene(
         &mut self,
@@ -75,8 +86,8 @@ impl Session {
             self.status.forget(old.id);
         }
         let Some(live) = &mut self.live else { return Ok(()) };
-        let frame = live.observe(true, &self.status);
-        self.status.sketch(&live.info, frame);
+        live.observe(true, &self.status);
+        self.status.film(live.id, &live.info, live.frames.frames());
         // The first picture is shown before the knobs are examined.
         self.knobs.clear();
         self.switches.clear();
@@ -184,6 +195,7 @@ impl Session {
             values,
         };
         self.status.copy(live.id, id);
+        self.status.film(id, &info, live.frames.frames());
         self.pins.push(Pin { state, info, frames: live.frames.clone() });
         self.set_stage();
         Answer::yes(format!("pinned as `{name}`; the next run is shown beside it"))

@@ -31,6 +31,7 @@ pub(super) fn run_state(live: &Live) -> RunState {
         id: live.id,
         points: live.rows.len(),
         step: row.step,
+        picture: live.frames.last_picture(),
         time: row.time,
         end: plan.clock.end * plan.units.time,
         dt: row.dt,
@@ -141,6 +142,9 @@ impl Session {
             stream: self.stage.as_ref().map(|s| s.stream.clone()),
             news: self.news.clone(),
         };
+        if let Some(run) = &state.run {
+            self.status.set_pace(run.unknowns, run.seconds_per_step);
+        }
         match serde_json::to_string(&state) {
             Ok(text) => self.status.publish(text),
             Err(e) => eprintln!("warning: the state cannot be sent to the page: {e}"),
@@ -178,7 +182,7 @@ impl Session {
         let guess = || {
             let live = live.filter(|l| l.rows.len() > 1)?;
             let ratio = s.unknowns as f64 / knobs::unknowns(&live.drive.plan) as f64;
-            Some(live.usual_step() * ratio.powf(STEP_GROWTH))
+            Some(live.usual_step() * ratio.powf(knobs::STEP_GROWTH))
         };
         DialState {
             cells: s.cells,

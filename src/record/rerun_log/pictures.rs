@@ -80,6 +80,14 @@ impl RerunLog {
             self.classes.clone_from(&particles.class);
             points = points.with_class_ids(particles.class.iter().copied());
         }
+        // Old recordings have no radii of their own.
+        let usual = [self.particle_radius];
+        let radii = if particles.radii.is_empty() { &usual[..] } else { &particles.radii };
+        if self.radii != radii {
+            self.radii = radii.to_vec();
+            let radius = |&radius: &f32| Radius::new_scene_units(radius);
+            points = points.with_radii(radii.iter().map(radius));
+        }
         if let Some(scalar) = &particles.scalar {
             expect_length("particle values", scalar.values.len(), count)?;
             let signed = self.particle_quantity.as_ref().is_some_and(|q| q.signed);

@@ -128,27 +128,58 @@ impl Recorded {
     /// The particles of each snapshot, with its time (s), in order.
     pub fn particles(&self) -> Vec<(f64, ParticleSnapshot)> {
         let positions = archetypes::Points2D::descriptor_positions().component;
+        let radii = archetypes::Points2D::descriptor_radii().component;
         let classes = archetypes::Points2D::descriptor_class_ids().component;
         let mut pictures: Vec<(f64, Vec<[f32; 2]>)> = vec![];
-        // Classes are recorded only when they change.
-        let mut changes: Vec<(f64, Vec<u16>)> = vec![];
+        // These are recorded only when they change.
+        let mut sizes: Changes<f32> = Changes::default();
+        let mut materials: Changes<u16> = Changes::default();
         for (chunk, _) in self.of_run().filter(|(_, path)| *path == ["world", "particles"]) {
             let times = seconds(chunk, SIM_TIME, positions);
             let points = chunk.iter_slices::<[f32; 2]>(positions).map(<[_]>::to_vec);
             pictures.extend(times.into_iter().zip(points));
-            let times = seconds(chunk, SIM_TIME, classes);
-            let numbers = chunk.iter_slices::<u16>(classes).map(<[_]>::to_vec);
-            changes.extend(times.into_iter().zip(numbers));
+            sizes.add(seconds(chunk, SIM_TIME, radii), chunk.iter_slices::<f32>(radii));
+            materials.add(seconds(chunk, SIM_TIME, classes), chunk.iter_slices::<u16>(classes));
         }
         pictures.sort_by(|a, b| a.0.total_cmp(&b.0));
-        changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (sizes, materials) = (sizes.sorted(), materials.sorted());
         let snapshot = |(time, positions): (f64, Vec<[f32; 2]>)| {
-            let last = changes.partition_point(|c| c.0 <= time).checked_sub(1);
-            let mut class = last.map_or(vec![], |k| changes[k].1.clone());
+            let mut class = materials.at(time).to_vec();
             class.resize(positions.len(), 0);
-            (time, ParticleSnapshot { positions, class, scalar: None })
+            let radii = sizes.at(time);
+            let radii = if radii.len() == positions.len() { radii.to_vec() } else { vec![] };
+            (time, ParticleSnapshot { positions, class, radii, scalar: None })
         };
         pictures.into_iter().map(snapshot).collect()
+    }
+
+    /// The dye lines of each snapshot, with its time (s), in order.
+    pub fn dye_lines(&self) -> Vec<(f64, Vec<Vec<[f32; 2]>>)> {
+        self.strips("dye")
+    }
+
+    /// The director strokes of each snapshot, each given by its two end points, with its time (s),
+    /// in order.
+    pub fn glyphs(&self) -> Vec<(f64, Vec<[[f32; 2]; 2]>)> {
+        let ends = |strip: Vec<[f32; 2]>| <[[f32; 2]; 2]>::try_from(strip).ok();
+        let of = |(time, strips): (f64, Vec<_>)| (time, strips.into_iter().filter_map(ends));
+        self.strips("directors").into_iter().map(of).map(|(t, s)| (t, s.collect())).collect()
+    }
+
+    /// Polylines of an entity of the flow.
+    fn strips(&self, name: &str) -> Vec<(f64, Vec<Vec<[f32; 2]>>)> {
+        let component = archetypes::LineStrips2D::descriptor_strips().component;
+        let mut pictures = vec![];
+        for (chunk, _) in self.of_run().filter(|(_, path)| *path == ["world", name]) {
+            let times = seconds(chunk, SIM_TIME, component);
+            let strips = chunk.iter_component::<components::LineStrip2D>(component).map(|batch| {
+                let points = |s: &components::LineStrip2D| s.0.iter().map(|p| p.0).collect();
+                batch.as_slice().iter().map(points).collect()
+            });
+            pictures.extend(times.into_iter().zip(strips));
+        }
+        pictures.sort_by(|a: &(f64, Vec<_>), b| a.0.total_cmp(&b.0));
+        pictures
     }
 
     /// The snapshots of each field on `domain`, with their time (s), in order.
@@ -174,6 +205,35 @@ impl Recorded {
             pictures.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         fields
+    }
+}
+
+/// Lists of values that hold from a time (s) on.
+struct Changes<T>(Vec<(f64, Vec<T>)>);
+
+impl<T> Default for Changes<T> {
+    fn default() -> Self {
+        Self(vec![])
+    }
+}
+
+impl<T: Copy> Changes<T> {
+    fn add<'a>(&mut self, times: Vec<f64>, lists: impl Iterator<Item = &'a [T]>)
+    where
+        T: 'a,
+    {
+        self.0.extend(times.into_iter().zip(lists.map(<[_]>::to_vec)));
+    }
+
+    fn sorted(mut self) -> Self {
+        self.0.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self
+    }
+
+    /// The list that holds at a time; empty before the first one.
+    fn at(&self, time: f64) -> &[T] {
+        let last = self.0.partition_point(|c| c.0 <= time).checked_sub(1);
+        last.map_or(&[], |k| &self.0[k].1)
     }
 }
 

@@ -40,7 +40,6 @@ impl RerunLog {
         self.rec.log_static(
             self.paths.at("world/particles"),
             &archetypes::Points2D::update_fields()
-                .with_radii([Radius::new_scene_units(info.particle_radius)])
                 .with_show_labels(false)
                 .with_draw_order(depth::PARTICLES),
         )?;

@@ -1,0 +1,68 @@
+//! This module implements `grainscope report`: one page of runs that opens without a server.
+
+use super::{Failure, print};
+use crate::light::reel::Detail;
+use crate::light::report::{self, ReportError};
+use crate::results::{self, Member};
+use std::path::{Path, PathBuf};
+
+/// Write one page of one or more runs: the flow, curves, results, scene. It opens without a network.
+///
+/// A run is given as the folder that `run` wrote, as one of its files, or as a recording (.rrd).
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folders of runs, or recordings
+    #[arg(required = true, value_name = "RUN")]
+    runs: Vec<PathBuf>,
+    /// Path of the page [default: report.html in the folder of a single run, else ./report.html]
+    #[arg(short, long, value_name = "PATH")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    detail: Amount,
+}
+
+/// How much of the recordings a report or film shows.
+#[derive(clap::Args, Clone, Copy)]
+pub struct Amount {
+    /// Largest number of frames of a run; more are evenly thinned
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// Largest number of particles in a frame; more are evenly thinned
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..))]
+    particles: u32,
+}
+
+impl Amount {
+    /// The detail of the packed frames.
+    pub fn detail(self) -> Detail {
+        let (frames, particles) = (self.frames as usize, self.particles as usize);
+        Detail { frames, particles, ..Detail::default() }
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(e: ReportError) -> Self {
+        Failure::Environment(e.to_string())
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let members = results::open_each(&args.runs)?;
+    let path = args.output.clone().unwrap_or_else(|| match args.runs.as_slice() {
+        [one] if one.is_dir() => one.join("report.html"),
+        _ => PathBuf::from("report.html"),
+    });
+    print(&write(&members, args.detail.detail(), &path)?)
+}
+
+/// Writes a report; returns a line that says so.
+pub fn write(members: &[Member], detail: Detail, path: &Path) -> Result<String, Failure> {
+    let paths: Vec<String> = members.iter().map(|m| m.path.display().to_string()).collect();
+    let command = format!("grainscope report {} -o {}", paths.join(" "), path.display());
+    let bytes = report::write(members, detail, path, &command)?;
+    for note in members.iter().flat_map(|m| &m.notes) {
+        eprintln!("note: {note}");
+    }
+    Ok(format!("wrote {} ({:.1} MB)", path.display(), bytes as f64 / 1e6))
+}

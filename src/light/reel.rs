@@ -1,0 +1,134 @@
+//! This module reads the frames of a finished run and packs them for reports and films.
+
+use super::Description;
+use super::pack::{pack, thin};
+use crate::frame::{GridField, RunInfo, Snapshot};
+use crate::results::{Member, SAME_TIME};
+use indexmap::IndexMap;
+use std::path::PathBuf;
+
+/// Error of reading the frames of a run.
+#[derive(Debug, thiserror::Error)]
+pub enum ReelError {
+    /// The run has no recording.
+    #[error("{}: has no recording, so there are no frames to show; run the scene again without --no-recording", .0.display())]
+    NoRecording(PathBuf),
+    /// The recording has no pictures.
+    #[error("{}: its recording has no pictures", .0.display())]
+    NoPictures(PathBuf),
+}
+
+/// The packed frames of a run.
+pub struct Reel {
+    /// Constant data of the run.
+    pub description: Description,
+    /// Time (s) and packed frame, in order.
+    pub frames: Vec<(f64, Vec<u8>)>,
+    /// Ends of the colour scale of each field over all frames.
+    pub ranges: IndexMap<String, [f32; 2]>,
+    /// Number of frames of the recording that have a picture.
+    pub pictures: usize,
+    /// Largest number of particles in a frame of the recording.
+    pub recorded: usize,
+    /// Largest number of particles in a packed frame.
+    pub kept: usize,
+}
+
+/// Size and detail of a reel.
+#[derive(Clone, Copy, Debug)]
+pub struct Detail {
+    /// Number of frames at most.
+    pub frames: usize,
+    /// Number of particles in a frame at most.
+    pub particles: usize,
+    /// Number of samples of a field along the longer side at most.
+    pub samples: usize,
+}
+
+impl Default for Detail {
+    fn default() -> Self {
+        Detail { frames: 200, particles: 20_000, samples: 128 }
+    }
+}
+
+impl Reel {
+    /// Reads and packs the frames of a run.
+    ///
+    /// # Errors
+    /// There is no recording, or it has no pictures.
+    pub fn of(member: &Member, detail: Detail) -> Result<Reel, ReelError> {
+        let (Some(recorded), Some(info)) = (&member.recorded, &member.info) else {
+            return Err(ReelError::NoRecording(member.path.clone()));
+        };
+        let particles = recorded.particles();
+        let (dye, glyphs) = (recorded.dye_lines(), recorded.glyphs());
+        let fields: Vec<_> = recorded.fields(info.domain).into_values().collect();
+        let mut reel = Reel {
+            description: Description::new(info),
+            frames: vec![],
+            ranges: IndexMap::new(),
+            pictures: particles.len(),
+            recorded: particles.iter().map(|(_, p)| p.positions.len()).max().unwrap_or(0),
+            kept: 0,
+        };
+        let every = particles.len().div_ceil(detail.frames.max(1)).max(1);
+        let last = particles.len().saturating_sub(1);
+        for (k, (time, particles)) in particles.iter().enumerate() {
+            if k % every != 0 && k != last {
+                continue;
+            }
+            let snapshot = Snapshot {
+                particles: thin(particles, detail.particles),
+                dye_lines: at(&dye, *time).cloned().unwrap_or_default(),
+                glyphs: at(&glyphs, *time).cloned().unwrap_or_default(),
+                fields: fields
+                    .iter()
+                    .filter_map(|list| at(list, *time))
+                    .map(|field| coarse(field, detail.samples, info))
+                    .collect(),
+                ..Snapshot::default()
+            };
+            reel.kept = reel.kept.max(snapshot.particles.positions.len());
+            for field in &snapshot.fields {
+                let range = reel.ranges.entry(field.name.clone()).or_insert(field.range);
+                *range = [range[0].min(field.range[0]), range[1].max(field.range[1])];
+            }
+            reel.frames.push((*time, pack(&snapshot, info)));
+        }
+        match reel.frames.is_empty() {
+            true => Err(ReelError::NoPictures(member.path.clone())),
+            false => Ok(reel),
+        }
+    }
+}
+
+/// The entry of a list at a time.
+fn at<T>(list: &[(f64, T)], time: f64) -> Option<&T> {
+    let k = list.partition_point(|(t, _)| *t < time - SAME_TIME * time.abs());
+    list.get(k).filter(|(t, _)| *t <= time + SAME_TIME * time.abs()).map(|(_, value)| value)
+}
+
+/// A field on at most `samples` samples along its longer side, with the ends of its colour scale.
+fn coarse(field: &GridField, samples: usize, info: &RunInfo) -> GridField {
+    let every = field.nx.max(field.ny).div_ceil(samples.max(1)).max(1);
+    let mut coarse = match every {
+        1 => field.clone(),
+        _ => field.on(field.rect(), field.nx.div_ceil(every), field.ny.div_ceil(every)),
+    };
+    let signed = info.fields.iter().any(|q| q.name == field.name && q.signed);
+    coarse.range = range(&coarse.values, signed);
+    coarse
+}
+
+/// The smallest and largest finite value; symmetric about zero if the sign matters.
+fn range(values: &[f32], signed: bool) -> [f32; 2] {
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    let low = finite().reduce(f32::min).unwrap_or(0.0);
+    let high = finite().reduce(f32::max).unwrap_or(1.0);
+    if signed {
+        let reach = low.abs().max(high.abs());
+        [-reach, reach]
+    } else {
+        [low, high]
+    }
+}
