@@ -74,6 +74,8 @@ export function createEditor({ parent, text, changed, entries, save }) {
       ],
     }),
   });
+  // Reached by keyboard, so that long lines can be scrolled.
+  view.scrollDOM.tabIndex = 0;
   const at = (line) => view.state.doc.line(Math.min(Math.max(line, 1), view.state.doc.lines));
   return {
     text: () => view.state.doc.toString(),

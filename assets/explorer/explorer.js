@@ -136,23 +136,24 @@ const light = new LightView($("light"), async (run, k) => {
 const listings = new Map(); // run id -> listing
 let listing = false;
 
-// Reads which frames there are, and shows the latest one unless the user looks at an earlier one.
+// Shows the latest frame unless the user looks at an earlier one. Which frames there are is read
+// from the program, except that one more frame is known from the state.
 async function showLight() {
   if (listing || !state.run) return;
   listing = true;
   try {
     for (;;) {
-      const wanted = [[state.run.id, state.run.picture], ...state.pins.map((p) => [p.id, 0])];
+      const wanted = [[state.run.id, state.run.pictures], ...state.pins.map((p) => [p.id, null])];
       if (!changed("light", wanted)) return;
       for (const id of listings.keys()) if (!wanted.some((w) => w[0] === id)) listings.delete(id);
-      for (const [id] of wanted) {
-        if (id !== state.run.id && listings.has(id)) continue;
+      for (const [id, pictures] of wanted) {
+        const known = listings.get(id);
+        if (known && (!pictures || extended(known, pictures))) continue;
         const response = await fetch(`api/runs/${id}`);
         if (!response.ok) { seen.delete("light"); return; }
         listings.set(id, await response.json());
       }
-      const runs = wanted.map((w) => listings.get(w[0]));
-      light.update(runs);
+      light.update(wanted.map((w) => listings.get(w[0])));
     }
   } catch (_) {
     // The next state from the session causes another attempt.
@@ -160,6 +161,15 @@ async function showLight() {
   } finally {
     listing = false;
   }
+}
+
+// Whether a listing has these pictures, after the last one was appended to it if it was missing.
+function extended(known, [count, step, time]) {
+  if (known.steps.length === count - 1 && known.steps[count - 2] < step) {
+    known.steps.push(step);
+    known.times.push(time);
+  }
+  return known.steps.length === count && known.steps[count - 1] === step;
 }
 
 // --- which view is shown ---
@@ -453,7 +463,17 @@ function title(column) {
   return column;
 }
 
+const PLOT_EVERY = 300; // milliseconds
+let plotted = 0;
+let plotting = 0;
+// Draws the curves, at most every PLOT_EVERY.
 function renderPlots() {
+  clearTimeout(plotting);
+  plotting = setTimeout(drawPlots, Math.max(0, plotted + PLOT_EVERY - performance.now()));
+}
+
+function drawPlots() {
+  plotted = performance.now();
   const live = state && state.run && curves.get(state.run.id);
   if (!live) return;
   const columns = live.columns.filter((c) => c !== "step" && c !== "time");

@@ -30,11 +30,18 @@ function fileName() { return $("editor-name").value.trim() || "my_scene.toml"; }
 
 // --- opening and closing ---
 
+// The editor is large, so it is loaded when it is needed.
+function loadEditor() {
+  if (window.SceneEditor) return Promise.resolve();
+  return new Promise((done, failed) => document.head.append(make("script", { src: "editor.js", onload: done, onerror: failed })));
+}
+
 async function openEditor() {
   const id = $("scene").value;
   const response = await fetch(`api/scene/${encodeURIComponent(id)}`);
   if (!response.ok) { toast("this scene cannot be opened", false); return; }
   const opened = await response.json();
+  await loadEditor();
   if (!scene.schema) scene.schema = await (await fetch("api/schema")).json();
   scene.kept = opened.text;
   scene.version = opened.version;

@@ -9,7 +9,7 @@ const graphicsCard = (() => {
   let name;
   return () => {
     if (name === undefined) {
-      const gl = document.createElement("canvas").getContext("webgl2");
+      const gl = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
       const info = gl && gl.getExtension("WEBGL_debug_renderer_info");
       const found = gl ? gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER) : "";
       name = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(found) ? "" : found;
@@ -20,10 +20,14 @@ const graphicsCard = (() => {
   };
 })();
 
+// The drawing context of a canvas. Without a graphics card it draws in memory: a canvas drawn by a
+// program that imitates a card is slower by far.
+function penOf(canvas) { return canvas.getContext("2d", { willReadFrequently: !graphicsCard() }); }
+
 class CanvasSurface {
   constructor(canvas) {
     this.canvas = canvas;
-    this.pen = canvas.getContext("2d");
+    this.pen = penOf(canvas);
     this.box = [0, 0, 0, 0];
     this.scratch = null;
     this.discPainter = null;
@@ -66,7 +70,7 @@ class CanvasSurface {
   image(rgba, nx, ny, x, y, w, h) {
     if (!this.scratch) this.scratch = document.createElement("canvas");
     [this.scratch.width, this.scratch.height] = [nx, ny];
-    this.scratch.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(rgba.buffer), nx, ny), 0, 0);
+    penOf(this.scratch).putImageData(new ImageData(new Uint8ClampedArray(rgba.buffer), nx, ny), 0, 0);
     this.pen.imageSmoothingEnabled = true;
     this.pen.imageSmoothingQuality = "high";
     this.pen.drawImage(this.scratch, x, y, w, h);
@@ -117,24 +121,23 @@ function makeDiscPainter() {
 class PixelDiscs {
   constructor() {
     this.canvas = document.createElement("canvas");
-    this.spans = new Map(); // half-widths of the rows of a disc by four times its radius
+    this.spans = []; // rows of a disc by four times its radius: [offset, half-width] in turn
   }
 
   rows(quarters) {
-    let rows = this.spans.get(quarters);
-    if (!rows) {
+    if (!this.spans[quarters]) {
       const r = quarters / 4;
-      rows = [];
-      for (let dy = -Math.floor(r); dy <= r; dy++) rows.push([dy, Math.floor(Math.sqrt(r * r - dy * dy))]);
-      this.spans.set(quarters, rows);
+      const rows = [];
+      for (let dy = -Math.floor(r); dy <= r; dy++) rows.push(dy, Math.floor(Math.sqrt(r * r - dy * dy)));
+      this.spans[quarters] = Int32Array.from(rows);
     }
-    return rows;
+    return this.spans[quarters];
   }
 
   draw(left, top, w, h, x, y, radius, paint, colours) {
     if (this.canvas.width !== w || this.canvas.height !== h) {
       [this.canvas.width, this.canvas.height] = [w, h];
-      this.pen = this.canvas.getContext("2d");
+      this.pen = penOf(this.canvas);
       this.data = this.pen.createImageData(w, h);
       this.pixels = new Uint32Array(this.data.data.buffer);
     }
@@ -143,14 +146,17 @@ class PixelDiscs {
     const words = new Uint32Array(colours.length / 3);
     for (let k = 0; k < words.length; k++) words[k] = (255 << 24) | (colours[3 * k + 2] << 16) | (colours[3 * k + 1] << 8) | colours[3 * k];
     for (let k = 0; k < x.length; k++) {
-      const [cx, cy] = [Math.round(x[k] - left - 0.5), Math.round(y[k] - top - 0.5)];
+      const cx = Math.round(x[k] - left - 0.5);
+      const cy = Math.round(y[k] - top - 0.5);
       const reach = radius[k] + 1;
       if (cx < -reach || cy < -reach || cx > w + reach || cy > h + reach) continue;
       const word = words[paint[k]];
-      for (const [dy, half] of this.rows(Math.round(4 * Math.max(radius[k], 0.5)))) {
-        const row = cy + dy;
+      const rows = this.rows(Math.round(4 * Math.max(radius[k], 0.5)));
+      for (let n = 0; n < rows.length; n += 2) {
+        const row = cy + rows[n];
         if (row < 0 || row >= h) continue;
-        pixels.fill(word, row * w + Math.max(cx - half, 0), row * w + Math.max(Math.min(cx + half + 1, w), 0));
+        const stop = row * w + Math.min(cx + rows[n + 1] + 1, w);
+        for (let at = row * w + Math.max(cx - rows[n + 1], 0); at < stop; at++) pixels[at] = word;
       }
     }
     this.pen.putImageData(this.data, 0, 0);

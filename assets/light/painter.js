@@ -197,7 +197,7 @@ function paintHead(surface, description, moment, { left, right, top }, theme, un
   surface.text(time, right, top + 18 * unit, size, theme.ink, "end");
   const room = right - left - 12 * unit - surface.measure(time, size);
   let title = description.name;
-  while (title.length > 1 && surface.measure(title, size) > room) title = title.slice(0, title.length > 2 && title.endsWith("…") ? -2 : -1).trimEnd() + "…";
+  for (let n = title.length - 1; n > 0 && surface.measure(title, size) > room; n--) title = `${description.name.slice(0, n)}…`;
   if (surface.measure(title, size) <= room) surface.text(title, left, top + 18 * unit, size, theme.ink, "start");
 }
 

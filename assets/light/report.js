@@ -3,6 +3,8 @@
 
 const $ = (id) => document.getElementById(id);
 const data = JSON.parse($("data").textContent);
+// Summaries are inside as the texts of their files, so that no digit changes.
+for (const run of data.runs) if (run.summary) run.summary = JSON.parse(run.summary);
 
 // --- the flow ---
 
@@ -80,7 +82,10 @@ function table(place, runs, part, title) {
   };
   const head = make("thead", {}, make("tr", {}, make("th", { scope: "col" }, title), ...runs.map((run) => make("th", { scope: "col" }, run.name))));
   const rows = keys.map((key) => make("tr", {}, make("th", { scope: "row" }, key.replaceAll("_", " ")), ...columns.map((c) => cell(c.get(key)))));
-  place.append(make("div", { className: "wide" }, make("table", {}, head, make("tbody", {}, ...rows))));
+  const scroller = make("div", { className: "wide", tabIndex: 0, ariaLabel: title });
+  scroller.setAttribute("role", "region");
+  place.append(scroller);
+  scroller.append(make("table", {}, head, make("tbody", {}, ...rows)));
 }
 
 function renderTables() {

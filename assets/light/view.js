@@ -184,7 +184,8 @@ class LightView {
         const k = this.k;
         if (!runs.length || k < 0) break;
         const frames = await Promise.all(runs.map((run) => this.frame(run, this.indexOf(run))));
-        if (runs !== this.runs || frames.some((f) => !f)) continue;
+        // What was loaded is shown even if there are newer frames by now.
+        if (runs[0].id !== this.runs[0].id || frames.some((f) => !f)) continue;
         this.panels = runs.map((run, i) => ({ description: run.description, frame: frames[i], time: run.times[this.indexOf(run)] }));
         this.shown = k;
         this.draw();

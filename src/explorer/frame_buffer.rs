@@ -41,9 +41,10 @@ impl FrameBuffer {
         self.frames.last().is_some_and(|f| f.snapshot.is_some())
     }
 
-    /// Step of the last frame that has a snapshot.
-    pub fn last_picture(&self) -> Option<u64> {
-        self.frames.iter().rev().find(|f| f.snapshot.is_some()).map(|f| f.step)
+    /// Number of frames that have a snapshot, and step and time (s) of the last one.
+    pub fn pictures(&self) -> (usize, u64, f64) {
+        let drawn = self.frames.iter().filter(|f| f.snapshot.is_some());
+        drawn.fold((0, 0, 0.0), |(count, ..), f| (count + 1, f.step, f.time_s))
     }
 
     /// Removes every second snapshot, except the first and the last.

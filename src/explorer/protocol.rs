@@ -190,8 +190,8 @@ pub struct RunState {
     pub points: usize,
     /// Number of the present step.
     pub step: u64,
-    /// Step of the last frame that has a picture.
-    pub picture: Option<u64>,
+    /// Number of frames that have a picture, and step and time (s) of the last one.
+    pub pictures: (usize, u64, f64),
     /// Simulated time (s).
     pub time: f64,
     /// End time of the scene (s).

@@ -58,9 +58,9 @@ struct Run {
     ranges: IndexMap<String, [f32; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     series: Option<Series>,
-    /// Content of `summary.json`; `None` if there is none.
+    /// Text of `summary.json`; `None` if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
-    summary: Option<serde_json::Value>,
+    summary: Option<String>,
     /// Values at the end.
     values: IndexMap<String, f64>,
     scene: Option<String>,
@@ -158,7 +158,7 @@ fn run(member: &Member, detail: Detail) -> std::io::Result<(Run, Option<String>)
         frames: vec![],
         ranges: IndexMap::new(),
         series: member.table.as_ref().map(|t| series(&t.columns)),
-        summary: member.summary_json(),
+        summary: member.summary_text().map(String::from),
         values: member.values_at(member.end).unwrap_or_default(),
         scene: member.scene_toml.clone(),
         notes,

@@ -244,9 +244,9 @@ impl Member {
         }
     }
 
-    /// Content of `summary.json`; `None` if there is none.
-    pub fn summary_json(&self) -> Option<serde_json::Value> {
-        self.summary.as_ref().map(|s| s.whole.clone())
+    /// Text of `summary.json`; `None` if there is none.
+    pub fn summary_text(&self) -> Option<&str> {
+        self.summary.as_ref().map(|s| s.text.as_str())
     }
 
     /// SHA-256 of the final state, hexadecimal; `None` if unknown.

@@ -27,9 +27,9 @@ pub(super) struct Summary {
     pub(super) mean_alignment: Option<f64>,
     #[serde(default)]
     pub(super) recording: Option<PathBuf>,
-    /// The whole content.
+    /// The text of the file.
     #[serde(skip)]
-    pub(super) whole: serde_json::Value,
+    pub(super) text: String,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -48,7 +48,7 @@ impl Summary {
         };
         let text = read(path)?;
         let mut summary: Summary = serde_json::from_str(&text).map_err(wrong)?;
-        summary.whole = serde_json::from_str(&text).map_err(wrong)?;
+        summary.text = text;
         if summary.schema != crate::record::summary::SCHEMA {
             return Err(broken(format!(
                 "has schema {}; this program reads {}: create it again with `grainscope run`",

@@ -40,7 +40,7 @@ fn a_report_holds_everything_and_loads_nothing() {
     let data = page.split("id=\"data\">").nth(1).and_then(|p| p.split("</script>").next());
     let data: serde_json::Value = serde_json::from_str(data.expect("data")).expect("JSON");
     for (k, name) in ["soft", "stiff"].iter().enumerate() {
-        assert_eq!(data["runs"][k]["summary"], folder.json(&format!("{name}/summary.json")));
+        assert_eq!(data["runs"][k]["summary"], folder.read(&format!("{name}/summary.json")));
         assert_eq!(data["runs"][k]["scene"], folder.read(&format!("{name}/scene.toml")));
         let frames = data["runs"][k]["frames"].as_array().expect("frames").len();
         assert_eq!(frames, data["runs"][k]["times"].as_array().expect("times").len());

@@ -5,6 +5,7 @@ use super::{PATIENCE, TempFolder};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// JSON key of element ids in WebDriver.
@@ -17,8 +18,12 @@ pub const TAB: &str = "\u{e004}";
 /// WebDriver code of the right arrow key.
 pub const RIGHT: &str = "\u{e014}";
 
+/// Browsers need much computing time, so that tests take turns with them.
+static TURN: Mutex<()> = Mutex::new(());
+
 /// A browser session.
 pub struct Browser {
+    _turn: MutexGuard<'static, ()>,
     driver: Child,
     port: u16,
     session: String,
@@ -58,6 +63,7 @@ impl Browser {
             line.split_once("successfully on port ")?.1.trim_end_matches('.').parse().ok()
         });
         let Some(port) = port else { return skipped("chromedriver does not start") };
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = TempFolder::new().expect("a folder");
         let mut arguments = vec![
             "--headless=new".to_string(),
@@ -85,7 +91,7 @@ impl Browser {
             let _ = driver.kill();
             return skipped(&format!("no browser can be started: {}", reply.text()));
         };
-        let browser = Browser { driver, port, session, _profile: profile };
+        let browser = Browser { _turn: turn, driver, port, session, _profile: profile };
         // Rendering without a graphics card delays scripts.
         let most = PATIENCE.as_millis() as u64;
         browser.command("POST", "/timeouts", json!({ "script": most, "pageLoad": most }));

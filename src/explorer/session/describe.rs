@@ -31,7 +31,7 @@ pub(super) fn run_state(live: &Live) -> RunState {
         id: live.id,
         points: live.rows.len(),
         step: row.step,
-        picture: live.frames.last_picture(),
+        pictures: live.frames.pictures(),
         time: row.time,
         end: plan.clock.end * plan.units.time,
         dt: row.dt,
