@@ -119,6 +119,7 @@ function render() {
     if (lastNews > 0 && $("toast").textContent.split(" — ")[0] !== state.news.text) toast(state.news.text, state.news.good);
     lastNews = state.news.number;
   }
+  offerViews();
   showStream();
   showLight();
 }
@@ -176,6 +177,14 @@ function extended(known, [count, step, time]) {
 
 // The Rerun viewer is loaded when it is chosen, or at once where a graphics card draws it.
 let chosenView = null; // the choice of the user
+let decided = false;
+function offerViews() {
+  if (decided) return;
+  decided = true;
+  $("view-rerun").parentNode.hidden = !state.viewer;
+  if (state.viewer && graphicsCard()) loadViewer();
+}
+
 function chooseView(name) {
   chosenView = name;
   if (name === "rerun") loadViewer();
@@ -547,6 +556,5 @@ window.addEventListener("message", (event) => {
   if (event.data.viewer === "failed") { chooseView("light"); toast(`The Rerun viewer failed: ${event.data.why}`, false); }
 });
 window.addEventListener("resize", renderPlots);
-if (graphicsCard()) loadViewer();
 showView();
 listen();

@@ -118,7 +118,10 @@ fn folder(args: &Args) -> String {
 
 /// The viewers that can be used.
 fn viewer() -> String {
-    let inside = "part of the program (--serve)";
+    let inside = match cfg!(feature = "viewer") {
+        true => "part of the program (--serve)",
+        false => "not part of this build (feature `viewer`)",
+    };
     match Command::new("rerun").arg("--version").output() {
         Ok(said) if said.status.success() => {
             let version = String::from_utf8_lossy(&said.stdout);

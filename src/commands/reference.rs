@@ -110,11 +110,18 @@ impl<'a> Reference<'a> {
         for (name, part) in properties(part) {
             let name = format!("{before}{name}");
             match self.table_of(part) {
-                Some(inside) if !inside.list => {
-                    let below = if inside.named { ".<name>." } else { "." };
+                Some(inside) => {
+                    if inside.list {
+                        self.row(&name, part, out);
+                    }
+                    let below = match (inside.list, inside.named) {
+                        (true, _) => "[].",
+                        (_, true) => ".<name>.",
+                        _ => ".",
+                    };
                     self.rows(inside.part, &format!("{name}{below}"), out);
                 }
-                _ => self.row(&name, part, out),
+                None => self.row(&name, part, out),
             }
         }
         // Alternatives that are tables themselves.
@@ -138,7 +145,14 @@ impl<'a> Reference<'a> {
             Value::Null => String::new(),
             value => format!("`{value}`"),
         };
-        *out += &format!("| `{name}` | {} | {default} | {} |\n", self.kind(whole), text(part));
+        let mut meaning = text(part);
+        // What each of the words means.
+        for choice in alternatives.into_iter().flatten().filter(|_| !has_tables) {
+            if let Some(word) = choice["const"].as_str().filter(|_| !text(choice).is_empty()) {
+                meaning += &format!("<br>`\"{word}\"`: {}", text(choice));
+            }
+        }
+        *out += &format!("| `{name}` | {} | {default} | {meaning} |\n", self.kind(whole));
         if has_tables {
             self.rows(whole, &format!("{name}."), out);
         }
@@ -160,10 +174,15 @@ impl<'a> Reference<'a> {
         let bound = |word: &str, key: &str| part[key].as_f64().map(|v| format!(", {word} {v}"));
         let bounds = bound("from", "minimum").unwrap_or_default()
             + &bound("to", "maximum").unwrap_or_default();
-        match &part["type"] {
-            Value::Array(_) if name("x and y") => "field".into(),
-            Value::Array(_) => "quantity".into(),
-            Value::String(kind) => match kind.as_str() {
+        let kinds: Vec<&str> = match &part["type"] {
+            Value::Array(kinds) => kinds.iter().filter_map(Value::as_str).collect(),
+            kind => kind.as_str().into_iter().collect(),
+        };
+        let kinds: Vec<&str> = kinds.into_iter().filter(|k| *k != "null").collect();
+        match kinds.as_slice() {
+            [_, _, ..] if name("x and y") => "field".into(),
+            [_, _, ..] => "quantity".into(),
+            [kind] => match *kind {
                 "array" => {
                     let count =
                         part["maxItems"].as_u64().map_or("list of".into(), |n| n.to_string());
@@ -175,7 +194,7 @@ impl<'a> Reference<'a> {
                 "object" => "table".into(),
                 other => other.into(),
             },
-            _ => "table".into(),
+            [] => "table".into(),
         }
     }
 }

@@ -78,9 +78,6 @@ pub enum ExplorerError {
     /// A thread cannot be started.
     #[error("a thread cannot be started: {0}")]
     Thread(std::io::Error),
-    /// The program does not contain the files of the viewer.
-    #[error("this program was built without the viewer's files")]
-    NoViewer,
 }
 
 /// A running explorer.
@@ -105,7 +102,7 @@ impl Explorer {
         let shared = status.clone();
         let desk = editor::Desk::new(settings.folder.clone(), &settings.scene, settings.from_file);
         let site = server::Site { commands: sender, status, desk };
-        let routes = server::routes(guard, site).ok_or(ExplorerError::NoViewer)?;
+        let routes = server::routes(guard, site);
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let session = thread("session")
             .spawn(move || {

@@ -155,6 +155,8 @@ pub struct State<'a> {
     pub folder: String,
     /// Folder for saved runs.
     pub out: String,
+    /// Whether this program contains the Rerun viewer.
+    pub viewer: bool,
     /// The recording that the viewer shows.
     pub stream: Option<Stream>,
     /// The latest event, which each page shows once.

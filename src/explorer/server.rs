@@ -51,8 +51,8 @@ pub struct Site {
 
 type Shared = State<Arc<Site>>;
 
-/// The routes of the page; `None` if this program was built without the viewer's files.
-pub fn routes(guard: Arc<Guard>, site: Site) -> Option<Router> {
+/// The routes of the page. Without the files of the Rerun viewer, the page has the light view alone.
+pub fn routes(guard: Arc<Guard>, site: Site) -> Router {
     let page = || file(kind::HTML, PAGE.as_bytes());
     let viewer = Router::new().route("/viewer.js", file(kind::SCRIPT, VIEWER_SCRIPT.as_bytes()));
     let inside = Router::new()
@@ -67,8 +67,6 @@ pub fn routes(guard: Arc<Guard>, site: Site) -> Option<Router> {
         .route("/light/canvas.js", file(kind::SCRIPT, light::CANVAS.as_bytes()))
         .route("/light/view.js", file(kind::SCRIPT, light::VIEW.as_bytes()))
         .route("/icon.svg", file(kind::SVG, ICON.as_bytes()))
-        .route("/viewer/", file(kind::HTML, VIEWER.as_bytes()))
-        .nest("/viewer", with_viewer(viewer)?)
         .route("/stream/{name}", get(stream))
         .route("/api/state", get(state))
         .route("/api/events", get(events))
@@ -82,7 +80,13 @@ pub fn routes(guard: Arc<Guard>, site: Site) -> Option<Router> {
         .route("/api/editor", post(edit))
         .route("/api/command", post(command))
         .route("/api/saved/{folder}/{file}", get(saved));
-    Some(guard.protect(page(), inside, Arc::new(site)))
+    let inside = match with_viewer(viewer) {
+        Some(viewer) => {
+            inside.route("/viewer/", file(kind::HTML, VIEWER.as_bytes())).nest("/viewer", viewer)
+        }
+        None => inside,
+    };
+    guard.protect(page(), inside, Arc::new(site))
 }
 
 /// Serves the page, and the streams of the viewer on a port of their own, until the program ends.

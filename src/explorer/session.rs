@@ -282,7 +282,7 @@ impl Session {
     /// Opens a recording of the present run and pins, and retires the previous one.
     fn set_stage(&mut self) {
         let number = self.number();
-        let Some(live) = &self.live else { return };
+        let Some(live) = self.live.as_ref().filter(|_| cfg!(feature = "viewer")) else { return };
         match Stage::open(&self.pins, live, number, &self.status) {
             Ok(stage) => {
                 if let Some(old) = self.stage.replace(stage) {

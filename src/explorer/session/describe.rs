@@ -139,6 +139,7 @@ impl Session {
             scenes: self.library.entries(),
             folder: self.library.folder().display().to_string(),
             out: self.out.display().to_string(),
+            viewer: cfg!(feature = "viewer"),
             stream: self.stage.as_ref().map(|s| s.stream.clone()),
             news: self.news.clone(),
         };

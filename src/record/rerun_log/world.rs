@@ -6,14 +6,6 @@ use crate::record::colour::OKABE_ITO;
 use rerun::archetypes;
 use rerun::components::Radius;
 
-/// The midpoint between the ends of a polyline.
-pub(super) fn middle(points: &[[f32; 2]]) -> [f32; 2] {
-    match (points.first(), points.last()) {
-        (Some(a), Some(b)) => [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])],
-        _ => [0.0, 0.0],
-    }
-}
-
 /// The colour of a curve, lightened where its contrast in the dark theme of the viewer is too low.
 pub(super) fn on_dark(color: [u8; 3]) -> [u8; 3] {
     match color {
@@ -62,24 +54,28 @@ impl RerunLog {
                     .with_radii([Radius::new_ui_points(1.5)])
                     .with_draw_order(depth::GAUGES),
             )?;
-            let named = gauges.map(|gauge| (middle(&gauge.points), gauge.name.as_str()));
-            self.names("world/gauges/names", named)?;
         }
-        // A single material needs no legend; with a particle quantity, a colour bar is in its
-        // place.
-        let materials: Vec<_> = info.materials.iter().filter(|material| material.drawn).collect();
-        if info.particle_quantity.is_none() && materials.len() > 1 {
-            let row = colour_bar::row(info.domain, materials.len());
-            let materials = materials.into_iter();
+        // A single material needs no legend; with a particle quantity, a colour bar is in its place.
+        // Names of gauges would cover the flow beside the gauges.
+        let drawn = info.materials.iter().filter(|material| material.drawn);
+        let gauges = info.gauges.iter().map(|gauge| (gauge.name.as_str(), GAUGE));
+        let bar = info.particle_quantity.is_some();
+        let materials = if bar || drawn.clone().count() < 2 { 0 } else { usize::MAX };
+        let entries: Vec<(&str, [u8; 3])> = drawn
+            .take(materials)
+            .map(|material| (material.name.as_str(), material.rgb))
+            .chain(gauges.filter(|_| !bar))
+            .collect();
+        if !entries.is_empty() {
+            let row = colour_bar::row(info.domain, entries.len());
             self.rec.log_static(
                 self.paths.at("world/materials"),
                 &archetypes::Points2D::new(row.clone())
-                    .with_colors(materials.clone().map(|material| rgb(material.rgb)))
+                    .with_colors(entries.iter().map(|entry| rgb(entry.1)))
                     .with_radii([Radius::new_ui_points(7.0)])
                     .with_draw_order(depth::LEGEND),
             )?;
-            let named = row.zip(materials.map(|material| material.name.as_str()));
-            self.names("world/materials/names", named)?;
+            self.names("world/materials/names", row.zip(entries.iter().map(|entry| entry.0)))?;
         }
         Ok(())
     }

@@ -123,7 +123,7 @@ impl Page {
             .route("/page.js", file(kind::SCRIPT, SCRIPT.as_bytes()))
             .route("/recording.rrd", get(stream));
         let inside = with_viewer(inside)
-            .ok_or_else(|| fault("this program was built without the viewer's files".into()))?;
+            .ok_or_else(|| fault("this program was built without the feature `viewer`".into()))?;
         let index = file(kind::HTML, INDEX.as_bytes());
         let routes = guard.protect(index, inside, ());
         let (stop, stopped) = oneshot::channel::<()>();
