@@ -45,8 +45,7 @@ pub struct ParticleSnapshot {
     pub positions: Vec<[f32; 2]>,
     /// Material of each particle: an index into [`RunInfo::materials`].
     pub class: Vec<u16>,
-    /// Radius at which each particle is drawn (m), from the volume it carries: squares of this
-    /// volume are covered up to their corners.
+    /// Radius at which each particle is drawn (m): that of a disc of the volume it carries.
     pub radii: Vec<f32>,
     /// Quantity that colours the particles; `None` colours them by material.
     pub scalar: Option<ParticleScalar>,

@@ -164,7 +164,7 @@ class PixelDiscs {
   }
 }
 
-const GROWTH = 1.5; // radii by which discs grow, and are cut back, to fill gaps
+const GROWTH = 1.8; // mean radii by which discs grow, and are cut back, to fill gaps
 
 // Draws discs with the gaps between neighbours filled, on an image of half the size.
 class Cover {
@@ -175,12 +175,11 @@ class Cover {
     const n = x.length;
     const [X, Y, R] = [new Float32Array(n), new Float32Array(n), new Float32Array(n)];
     let sum = 0;
-    for (let k = 0; k < n; k++) {
-      [X[k], Y[k], R[k]] = [0.5 * (x[k] - left), 0.5 * (y[k] - top), 0.5 * (1 + GROWTH) * radius[k]];
-      sum += 0.5 * GROWTH * radius[k];
-    }
+    for (let k = 0; k < n; k++) sum += 0.5 * radius[k];
+    const depth = (GROWTH * sum) / Math.max(n, 1);
+    for (let k = 0; k < n; k++) [X[k], Y[k], R[k]] = [0.5 * (x[k] - left), 0.5 * (y[k] - top), 0.5 * radius[k] + depth];
     const image = this.grown.draw(0, 0, nx, ny, X, Y, R, paint, colours);
-    cutBack(this.grown.pixels, nx, ny, sum / Math.max(n, 1));
+    cutBack(this.grown.pixels, nx, ny, depth);
     this.grown.pen.putImageData(this.grown.data, 0, 0);
     return image;
   }

@@ -71,12 +71,8 @@ impl Reel {
             recorded: particles.iter().map(|(_, p)| p.positions.len()).max().unwrap_or(0),
             kept: 0,
         };
-        let every = particles.len().div_ceil(detail.frames.max(1)).max(1);
-        let last = particles.len().saturating_sub(1);
-        for (k, (time, particles)) in particles.iter().enumerate() {
-            if k % every != 0 && k != last {
-                continue;
-            }
+        for k in evenly(particles.len(), detail.frames) {
+            let (time, particles) = &particles[k];
             let snapshot = Snapshot {
                 particles: thin(particles, detail.particles),
                 dye_lines: at(&dye, *time).cloned().unwrap_or_default(),
@@ -100,6 +96,16 @@ impl Reel {
             false => Ok(reel),
         }
     }
+}
+
+/// At most `most` numbers below `count`, evenly spaced, with the first and the last; of one number,
+/// it is the last.
+fn evenly(count: usize, most: usize) -> impl Iterator<Item = usize> {
+    let kept = most.clamp(1, count.max(1)).min(count);
+    (0..kept).map(move |i| match kept {
+        1 => count - 1,
+        _ => (i * (count - 1) + (kept - 1) / 2) / (kept - 1),
+    })
 }
 
 /// The entry of a list at a time.
@@ -130,5 +136,22 @@ fn range(values: &[f32], signed: bool) -> [f32; 2] {
         [-reach, reach]
     } else {
         [low, high]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_evenly_spaced_with_both_ends() {
+        let list = |count, most| evenly(count, most).collect::<Vec<_>>();
+        assert_eq!(list(5, 200), [0, 1, 2, 3, 4]);
+        assert_eq!(list(103, 4), [0, 34, 68, 102]);
+        assert_eq!(list(10, 1), [9]);
+        assert_eq!(list(0, 5), []);
+        let many = list(1000, 200);
+        assert_eq!((many.len(), many[0], many[199]), (200, 0, 999));
+        assert!(many.windows(2).all(|w| (5..=6).contains(&(w[1] - w[0]))));
     }
 }

@@ -7,8 +7,8 @@ use tiny_skia::{
     PixmapPaint, PremultipliedColorU8, Rect, Stroke, Transform,
 };
 
-/// Radii by which discs grow, and are cut back, to fill gaps.
-const GROWTH: f32 = 1.5;
+/// Mean radii by which discs grow, and are cut back, to fill gaps.
+const GROWTH: f32 = 1.8;
 
 /// An image, and the rectangle to which drawing is restricted.
 pub struct Surface {
@@ -82,15 +82,15 @@ impl Surface {
         self.clip = None;
     }
 
-    /// Draws discs with the gaps between neighbours filled: discs grown by [`GROWTH`] radii, of which
-    /// what is nearer to the outside than this is taken away.
+    /// Draws discs with the gaps between neighbours filled: discs grown by [`GROWTH`] mean radii, of
+    /// which what is nearer to the outside than this is taken away.
     pub fn cover(&mut self, x: &[f32], y: &[f32], radius: &[f32], paint: &[u8], colours: &[u8]) {
         let (w, h) = (self.image.width(), self.image.height());
         let Some(mut grown) = Surface::new(w, h) else { return };
         grown.clip = self.clip.clone();
-        let large: Vec<f32> = radius.iter().map(|r| (1.0 + GROWTH) * r).collect();
-        grown.discs(x, y, &large, paint, colours);
         let depth = GROWTH * radius.iter().sum::<f32>() / radius.len().max(1) as f32;
+        let large: Vec<f32> = radius.iter().map(|r| r + depth).collect();
+        grown.discs(x, y, &large, paint, colours);
         let ends = grown.clip.map_or([0, 0, w as i32, h as i32], |c| c.0);
         cut_back(&mut grown.image, ends, depth);
         let mask = self.clip.as_ref().map(|c| &c.1);

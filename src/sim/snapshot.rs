@@ -15,6 +15,7 @@ use crate::space::particles::Particles;
 use crate::space::shape::Shape;
 use crate::threads;
 use raster::{Coarse, Raster, isoline, range, symmetric};
+use std::f64::consts::PI;
 
 /// Number of field samples in a parallel task.
 const SAMPLE_GRAIN: usize = 2048;
@@ -71,11 +72,11 @@ fn particles(plan: &Plan, all: &Particles) -> (ParticleSnapshot, Vec<usize>) {
     (picture, shown)
 }
 
-/// Radius at which a particle of a volume (dimensionless) is drawn (m): half the diagonal of a
-/// square of this volume, in steps of 9 %, so that recordings compress well.
+/// Radius at which a particle of a volume (dimensionless) is drawn (m): that of a disc of this volume,
+/// in steps of 9 %, so that recordings compress well.
 fn drawn_radius(plan: &Plan, volume: f64) -> f32 {
     const STEPS: f64 = 8.0;
-    let radius = (0.5 * volume).sqrt() * plan.units.length;
+    let radius = (volume / PI).sqrt() * plan.units.length;
     ((radius.log2() * STEPS).round() / STEPS).exp2() as f32
 }
 

@@ -15,6 +15,7 @@ mod runs;
 mod soak;
 mod stress;
 mod sweep;
+mod tutorial;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
