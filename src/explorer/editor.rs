@@ -14,7 +14,7 @@ use super::protocol::Answer;
 use super::status::Status;
 use crate::light::Description;
 use crate::light::pack::{pack, thin};
-use crate::plan::{self, Plan};
+use crate::plan::{self, Plan, memory};
 use crate::record::info::run_info;
 use crate::record::replace;
 use crate::scene::{self, Scene, SceneSource, is_folder_name};
@@ -229,6 +229,7 @@ fn check(source: &SceneSource, status: &Status) -> Edited {
 }
 
 fn draft(plan: &Plan, scene: &Scene, status: &Status) -> Result<Draft, String> {
+    memory::afford(plan).map_err(|e| e.to_string())?;
     let info = run_info(plan, &scene.name);
     let seeded = plan.mesh.cells() * plan.method.seeding.side.pow(2);
     let mut picture = match seeded <= MOST_SEEDED {
