@@ -182,7 +182,7 @@ function offerViews() {
   if (decided) return;
   decided = true;
   $("view-rerun").parentNode.hidden = !state.viewer;
-  if (state.viewer && graphicsCard()) loadViewer();
+  lookForCard(() => { if (state.viewer) loadViewer(); });
 }
 
 function chooseView(name) {

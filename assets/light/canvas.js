@@ -4,25 +4,30 @@
 
 const FONT = 'system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif';
 
-// The name of the graphics card that draws WebGL; "" if there is none, or software.
-const graphicsCard = (() => {
-  let name;
-  return () => {
-    if (name === undefined) {
-      const gl = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
-      const info = gl && gl.getExtension("WEBGL_debug_renderer_info");
-      const found = gl ? gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER) : "";
-      name = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(found) ? "" : found;
-      const lose = gl && gl.getExtension("WEBGL_lose_context");
-      if (lose) lose.loseContext();
-    }
-    return name;
-  };
-})();
+// The name of the graphics card that draws WebGL; "" if there is none, or as long as it is unknown.
+let graphicsCard = "";
 
-// The drawing context of a canvas. Without a graphics card it draws in memory: a canvas drawn by a
-// program that imitates a card is slower by far.
-function penOf(canvas) { return canvas.getContext("2d", { willReadFrequently: !graphicsCard() }); }
+// Looks for a graphics card, beside the page: to start a program that imitates one takes seconds.
+// `found` is called if there is one.
+function lookForCard(found) {
+  const look = `const gl = new OffscreenCanvas(1, 1).getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+    const info = gl && gl.getExtension("WEBGL_debug_renderer_info");
+    postMessage(gl ? gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER) : "");`;
+  try {
+    const worker = new Worker(URL.createObjectURL(new Blob([look], { type: "text/javascript" })));
+    worker.onmessage = (event) => {
+      worker.terminate();
+      graphicsCard = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(event.data) ? "" : event.data;
+      if (graphicsCard) found();
+    };
+  } catch (_) {
+    // Without workers there is no search; the page draws without a card.
+  }
+}
+
+// The drawing context of a canvas in memory: a canvas that is drawn by an imitated card is slower by
+// far.
+function penOf(canvas) { return canvas.getContext("2d", { willReadFrequently: true }); }
 
 class CanvasSurface {
   constructor(canvas) {
@@ -45,6 +50,17 @@ class CanvasSurface {
   }
   unclip() { this.pen.restore(); }
 
+  chooseDiscPainter() {
+    this.discPainter = new PixelDiscs();
+    this.cardTried = Boolean(graphicsCard);
+    if (!graphicsCard) return;
+    try {
+      this.discPainter = new GlDiscs();
+    } catch (_) {
+      // The pixels do it.
+    }
+  }
+
   cover(x, y, radius, paint, colours) {
     const [left, top, w, h] = this.box;
     if (!this.coverPainter) this.coverPainter = new Cover();
@@ -58,7 +74,7 @@ class CanvasSurface {
     const top = Math.floor(this.box[1]);
     const w = Math.max(1, Math.ceil(this.box[0] + this.box[2]) - left);
     const h = Math.max(1, Math.ceil(this.box[1] + this.box[3]) - top);
-    if (!this.discPainter) this.discPainter = makeDiscPainter();
+    if (!this.discPainter || (graphicsCard && !this.cardTried)) this.chooseDiscPainter();
     let image = this.discPainter.draw(left, top, w, h, x, y, radius, paint, colours);
     if (!image) {
       this.discPainter = new PixelDiscs();
@@ -104,17 +120,6 @@ class CanvasSurface {
   }
 
   measure(text, size) { this.pen.font = `${size}px ${FONT}`; return this.pen.measureText(text).width; }
-}
-
-function makeDiscPainter() {
-  if (graphicsCard()) {
-    try {
-      return new GlDiscs();
-    } catch (_) {
-      // The pixels do it.
-    }
-  }
-  return new PixelDiscs();
 }
 
 // Draws discs into the pixels of an image.
