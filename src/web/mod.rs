@@ -38,6 +38,7 @@ pub mod kind {
     /// A vector image.
     pub const SVG: &str = "image/svg+xml";
     /// A program for the browser.
+    #[cfg(feature = "viewer")]
     pub const WASM: &str = "application/wasm";
 }
 
