@@ -79,7 +79,19 @@ pub struct GridField {
     pub range: [f32; 2],
 }
 
+/// Smallest and largest finite value; `None` if there is none.
+pub fn extent(values: &[f32]) -> Option<[f32; 2]> {
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    Some([finite().reduce(f32::min)?, finite().reduce(f32::max)?])
+}
+
 impl GridField {
+    /// Centre of a cell (m), by the number of its value.
+    pub fn centre(&self, k: usize) -> [f32; 2] {
+        let at = |c: usize, i: usize| self.origin[c] + (i as f32 + 0.5) * self.cell[c];
+        [at(0, k % self.nx), at(1, k / self.nx)]
+    }
+
     /// The rectangle that the cells fill.
     pub fn rect(&self) -> Rect {
         let [x, y] = self.origin;

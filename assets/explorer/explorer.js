@@ -10,15 +10,14 @@ const curves = new Map(); // run id -> {columns, points}
 
 // --- communication with the session ---
 
+function post(path, value) {
+  return fetch(path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(value) });
+}
+
 async function send(command) {
   let answer;
   try {
-    const response = await fetch("api/command", {
-      method: "POST",
-      headers: { "content-type": "application/json" },
-      body: JSON.stringify(command),
-    });
-    answer = await response.json();
+    answer = await (await post("api/command", command)).json();
   } catch (_) {
     answer = { accepted: false, message: "grainscope does not answer" };
   }
@@ -489,14 +488,8 @@ function drawPlots() {
   const ending = (word) => columns.filter((c) => c.endsWith(word));
   const usual = [...ending(" rate"), ...ending(" volume"), ...ending("|n_x|"), "max_speed", "dissipation", "power_error"];
   if (changed("plots", columns) || $("plots").children.length === 0) {
-    $("plots").replaceChildren(...chosen.map((wish, k) => {
-      const select = make("select", { ariaLabel: `Curve ${k + 1}` },
-        ...columns.map((c) => make("option", { value: c }, title(c))));
-      select.value = columns.includes(wish) ? wish : usual[k];
-      select.onchange = () => { chosen[k] = select.value; renderPlots(); };
-      const svg = draw("svg", { role: "img" });
-      return make("div", { className: "plot" }, select, svg);
-    }));
+    $("plots").replaceChildren(...chosen.map((wish, k) =>
+      plotBox(`Curve ${k + 1}`, columns, title, columns.includes(wish) ? wish : usual[k], (column) => { chosen[k] = column; renderPlots(); })));
   }
   const runs = state.pins.map((p, k) => ({ name: p.name, color: color(k + 1), width: 1.3, curves: curves.get(p.id) }))
     .filter((r) => r.curves);

@@ -11,6 +11,14 @@ function draw(tag, attributes, text) {
   return node;
 }
 
+// An element with a list of columns and an empty plot; `changed` is called with another choice.
+function plotBox(label, columns, title, column, changed) {
+  const select = make("select", { ariaLabel: label }, ...columns.map((c) => make("option", { value: c }, title(c))));
+  select.value = column;
+  select.onchange = () => changed(select.value);
+  return make("div", { className: "plot" }, select, draw("svg", { role: "img" }));
+}
+
 // Draws one column of several runs into an SVG element.
 // runs: [{name, color, width, curves: {columns, points}}]; changes: times of parameter changes.
 function plot(svg, column, runs, changes) {

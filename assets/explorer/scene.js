@@ -17,11 +17,7 @@ const scene = {
 };
 
 async function editRequest(order) {
-  const response = await fetch("api/editor", {
-    method: "POST",
-    headers: { "content-type": "application/json" },
-    body: JSON.stringify(order),
-  });
+  const response = await post("api/editor", order);
   if (!response.ok) throw new Error(response.status === 413 ? "the text is too long" : "no answer");
   return response.json();
 }
@@ -53,7 +49,7 @@ async function openEditor() {
   document.querySelector("main").classList.add("editing");
   if (!scene.editor) {
     scene.editor = SceneEditor.createEditor({ parent: $("editor-text"), text: opened.text, changed: textChanged, entries, save: saveText });
-    scene.view = new LightView($("draft"), async () => Uint8Array.from(atob(scene.draft.frame), (c) => c.charCodeAt(0)));
+    scene.view = new LightView($("draft"), async () => bytesOf(scene.draft.frame));
     scene.handles = draw("svg", { class: "handles", role: "group", "aria-label": "Parts that can be dragged" });
     $("draft").querySelector(".light-stage").append(scene.handles);
     $("draft").querySelector(".light-bar").hidden = true;

@@ -8,13 +8,6 @@ for (const run of data.runs) if (run.summary) run.summary = JSON.parse(run.summa
 
 // --- the flow ---
 
-function bytesOf(text) {
-  const raw = atob(text);
-  const bytes = new Uint8Array(raw.length);
-  for (let k = 0; k < raw.length; k++) bytes[k] = raw.charCodeAt(k);
-  return bytes;
-}
-
 async function unpack(text) {
   const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
@@ -26,13 +19,7 @@ if (shown.length > 0) {
   light = new LightView($("light"), (run, k) => unpack(run.frames[k]));
   light.following = false;
   light.update(shown.map((run, k) => ({ id: k, description: run.description, times: run.times, frames: run.frames })));
-  light.ranges = Object.assign({}, ...shown.map((run) => run.ranges));
-  for (const run of shown) {
-    for (const [name, [low, high]] of Object.entries(run.ranges)) {
-      const known = light.ranges[name];
-      light.ranges[name] = [Math.min(low, known[0]), Math.max(high, known[1])];
-    }
-  }
+  for (const run of shown) for (const [name, range] of Object.entries(run.ranges)) light.widen({ name, range });
   light.same.checked = true;
   light.rescale();
   light.go(Math.min(data.start, shown[0].times.length - 1));
@@ -42,7 +29,6 @@ if (shown.length > 0) {
 
 // --- the plots ---
 
-const chosen = [];
 function renderPlots() {
   const runs = data.runs.filter((run) => run.series).map((run, k) => ({ name: run.name, color: COLORS[k % COLORS.length], width: 1.8, curves: run.series }));
   $("plots").hidden = runs.length === 0;
@@ -52,10 +38,8 @@ function renderPlots() {
     const ending = (word) => columns.filter((c) => c.endsWith(word));
     const usual = [...ending("_rate"), ...ending("_volume"), "mean_alignment", "max_speed", "dissipation", "dt"].filter((c) => columns.includes(c));
     for (let k = 0; k < Math.min(3, columns.length); k++) {
-      const select = make("select", { ariaLabel: `Curve ${k + 1}` }, ...columns.map((c) => make("option", { value: c }, data.units[c] ? `${c} (${data.units[c]})` : c)));
-      select.value = usual[k] || columns[k];
-      select.onchange = renderPlots;
-      $("plots").append(make("div", { className: "plot" }, select, draw("svg", { role: "img" })));
+      const title = (c) => (data.units[c] ? `${c} (${data.units[c]})` : c);
+      $("plots").append(plotBox(`Curve ${k + 1}`, columns, title, usual[k] || columns[k], renderPlots));
     }
   }
   [...$("plots").children].forEach((part) => plot(part.lastChild, part.firstChild.value, runs, []));

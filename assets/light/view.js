@@ -12,6 +12,9 @@ function make(tag, properties = {}, ...children) {
   return node;
 }
 
+// The bytes of a text in base 64.
+function bytesOf(text) { return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)); }
+
 class LightView {
   // `load(run, k)` gives the bytes of frame k of a run. Runs are {id, description, times}; the time
   // slider is that of the first one.
@@ -22,6 +25,7 @@ class LightView {
     this.look = { ...LOOK, dark: matchMedia("(prefers-color-scheme: dark)").matches };
     this.k = 0;
     this.following = true;
+    this.ranges = {}; // ends of the colour scales of the frames shown so far, by field
     this.shown = null; // index of the frame on the canvas
     this.drawn = null; // called after each drawing
     this.build(element);

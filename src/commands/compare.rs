@@ -1,9 +1,9 @@
 //! This module implements `grainscope compare`: runs side by side, in numbers and in one recording.
 
-use super::report::write as write_report;
 use super::{Failure, print};
 use crate::compare::{self, Comparison, Tolerance};
 use crate::light::reel::Detail;
+use crate::light::report;
 use crate::record::replace::{Aside, Kind, beside, may_replace};
 use crate::record::rerun_log::{Served, Sink};
 use crate::results::{self, Member, ResultsError};
@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let (mut comparison, served) = write(found, &members, &path, &sinks)?;
         if args.report {
             let page = path.with_file_name("report.html");
-            write_report(&members, Detail::default(), &page)?;
+            report::write(&members, Detail::default(), &page)?;
             comparison.files.push(page.display().to_string());
         }
         (comparison, served)

@@ -5,7 +5,7 @@ use super::{Failure, print};
 use crate::light::film::{FilmError, Look, Studio};
 use crate::light::reel::{Reel, ReelError};
 use crate::results;
-use indicatif::{ProgressBar, ProgressStyle};
+use crate::session::progress_bar;
 use std::path::PathBuf;
 
 /// Draw the frames of runs side by side: a film (.gif, .mp4) or numbered images (.png).
@@ -90,9 +90,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let height = args.height.unwrap_or_else(|| usual_height(args.width, &reels));
     let studio = Studio::new(reels, &look, [args.width, height])?;
-    let style = ProgressStyle::with_template("{bar:30} frame {pos} of {len}, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(studio.times.len() as u64).with_style(style);
+    let bar = progress_bar(studio.times.len() as u64, false);
     let files = studio.write(&args.output, args.fps, &mut |k| bar.set_position(k as u64 + 1));
     bar.finish_and_clear();
     let files = files?;

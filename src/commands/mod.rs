@@ -142,7 +142,7 @@ enum Command {
     /// Write a commented skeleton of a scene, to start from
     New(new::Args),
     /// Print the reference of scene files as Markdown: every key, value, default and meaning
-    Reference(reference::Args),
+    Reference,
     /// Print the JSON schema of scene files
     Schema,
     /// Print completions for a shell
@@ -321,7 +321,7 @@ fn run_command(command: Command) -> Result<(), Failure> {
         Command::Figure(args) => figure::run(&args),
         Command::Columns => print(&columns::markdown()),
         Command::New(args) => new::run(&args),
-        Command::Reference(args) => reference::run(&args),
+        Command::Reference => print(&reference::markdown()),
         Command::Schema => print(&scene::json_schema()),
         Command::Completions { shell } => {
             let mut out = Vec::new();

@@ -1,17 +1,10 @@
 //! This module implements `grainscope reference`: the reference of scene files, from their schema.
 
-use super::{Failure, print};
 use crate::scene;
 use serde_json::Value;
 
-/// Print the reference of scene files as Markdown: every key with its values, default and meaning.
-#[derive(clap::Args)]
-pub struct Args {}
-
-/// Runs the command.
-pub fn run(_: &Args) -> Result<(), Failure> {
-    print(&markdown())
-}
+/// First rows of every table of keys.
+const HEADER: &str = "| key | value | default | meaning |\n|---|---|---|---|\n";
 
 /// The reference as Markdown.
 pub fn markdown() -> String {
@@ -24,7 +17,7 @@ pub fn markdown() -> String {
          and `y`. Where there is no default, the key is required\nor has no effect when absent.\n\n\
          ## Top level\n\n",
     );
-    out += &reference.table(&schema);
+    out += &reference.own_rows(&schema);
     for (name, part) in properties(&schema) {
         if let Some(inside) = reference.table_of(part) {
             let title = match (inside.list, inside.named) {
@@ -93,13 +86,14 @@ impl<'a> Reference<'a> {
 
     /// The keys of a table, and of the tables inside it with dots.
     fn rows_of(&self, part: &'a Value) -> String {
-        let mut out = String::from("| key | value | default | meaning |\n|---|---|---|---|\n");
+        let mut out = String::from(HEADER);
         self.rows(part, "", &mut out);
         out + "\n"
     }
 
-    fn table(&self, part: &'a Value) -> String {
-        let mut out = String::from("| key | value | default | meaning |\n|---|---|---|---|\n");
+    /// The keys of a table without those of the tables inside it.
+    fn own_rows(&self, part: &'a Value) -> String {
+        let mut out = String::from(HEADER);
         for (name, part) in properties(part).filter(|(_, p)| self.table_of(p).is_none()) {
             self.row(name, part, &mut out);
         }

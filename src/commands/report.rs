@@ -1,10 +1,11 @@
 //! This module implements `grainscope report`: one page of runs that opens without a server.
 
 use super::{Failure, print};
-use crate::light::reel::Detail;
+use crate::light::pack::MOST_PARTICLES;
+use crate::light::reel::{Detail, MOST_FRAMES};
 use crate::light::report::{self, ReportError};
-use crate::results::{self, Member};
-use std::path::{Path, PathBuf};
+use crate::results;
+use std::path::PathBuf;
 
 /// Write one page of one or more runs: the flow, curves, results, scene. It opens without a network.
 ///
@@ -25,10 +26,10 @@ pub struct Args {
 #[derive(clap::Args, Clone, Copy)]
 pub struct Amount {
     /// Largest number of frames of a run; more are evenly thinned
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = MOST_FRAMES as u32, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
     /// Largest number of particles in a frame; more are evenly thinned
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = MOST_PARTICLES as u32, value_parser = clap::value_parser!(u32).range(1..))]
     particles: u32,
 }
 
@@ -53,16 +54,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         [one] if one.is_dir() => one.join("report.html"),
         _ => PathBuf::from("report.html"),
     });
-    print(&write(&members, args.detail.detail(), &path)?)
-}
-
-/// Writes a report; returns a line that says so.
-pub fn write(members: &[Member], detail: Detail, path: &Path) -> Result<String, Failure> {
-    let paths: Vec<String> = members.iter().map(|m| m.path.display().to_string()).collect();
-    let command = format!("grainscope report {} -o {}", paths.join(" "), path.display());
-    let bytes = report::write(members, detail, path, &command)?;
+    let bytes = report::write(&members, args.detail.detail(), &path)?;
     for note in members.iter().flat_map(|m| &m.notes) {
         eprintln!("note: {note}");
     }
-    Ok(format!("wrote {} ({:.1} MB)", path.display(), bytes as f64 / 1e6))
+    print(&format!("wrote {} ({:.1} MB)", path.display(), bytes as f64 / 1e6))
 }

@@ -2,9 +2,9 @@
 //! plots.
 
 use super::chosen;
-use super::report::write as write_report;
 use super::{Failure, memory, print};
 use crate::light::reel::Detail;
+use crate::light::report as page;
 use crate::record::folder::{self, Loaded};
 use crate::record::rerun_log::Sink;
 use crate::record::summary::Ending;
@@ -133,20 +133,27 @@ pub fn close(ended: Ended, output: Output) -> Result<(), Failure> {
     } else {
         print(&report(&ended, output.profile))?;
     }
-    if output.report {
-        let folder = Path::new(&ended.summary.folder);
-        let members = [Member::open(folder)?];
-        let said = write_report(&members, Detail::default(), &folder.join("report.html"))?;
-        tell(format_args!("{said}"));
-    }
+    let reported = if output.report { write_report(&ended) } else { Ok(()) };
     if let (Some(served), None) = (&ended.served, &ended.failure) {
         tell(format_args!("still serving {} (Ctrl-C ends)", served.url()));
         wait_for_interrupt(&ended.interrupted);
     }
     match ended.failure {
         Some(failure) => Err(failure.into()),
-        None => Ok(ended.plotted?),
+        None => {
+            reported?;
+            Ok(ended.plotted?)
+        }
     }
+}
+
+/// Writes the report of a run into its folder.
+fn write_report(ended: &Ended) -> Result<(), Failure> {
+    let folder = Path::new(&ended.summary.folder);
+    let path = folder.join("report.html");
+    let bytes = page::write(&[Member::open(folder)?], Detail::default(), &path)?;
+    tell(format_args!("wrote {} ({:.1} MB)", path.display(), bytes as f64 / 1e6));
+    Ok(())
 }
 
 /// The scene with an earlier end. The interval between frames is unchanged.

@@ -7,30 +7,28 @@
 
 mod drag;
 
+use super::draft::Draft;
 use super::knobs;
 use super::library::Library;
 use super::problem::Problem;
 use super::protocol::Answer;
 use super::status::Status;
 use crate::light::Description;
-use crate::light::pack::{pack, thin};
+use crate::light::pack::{MOST_PARTICLES, pack};
 use crate::plan::{self, Plan, memory};
 use crate::record::info::run_info;
 use crate::record::replace;
-use crate::scene::{self, Scene, SceneSource, is_folder_name};
+use crate::scene::{SceneSource, content_hash, is_folder_name};
 use crate::sim::snapshot;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use drag::Handle;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// Largest text of a scene that the page may send (bytes, as JSON).
 pub const MAX_SCENE: usize = 256 * 1024;
-/// Largest number of particles of the picture of a text.
-const MOST_PARTICLES: usize = 20_000;
 /// Texts whose initial state would have more particles get no picture of their particles.
 const MOST_SEEDED: usize = 2_000_000;
 
@@ -90,13 +88,18 @@ pub struct Edited {
     problem: Option<Problem>,
     /// What a checked text without errors makes.
     #[serde(skip_serializing_if = "Option::is_none")]
-    draft: Option<Draft>,
+    draft: Option<Made>,
+}
+
+impl From<Answer> for Edited {
+    fn from(answer: Answer) -> Edited {
+        Edited { answer: Some(answer), ..Edited::default() }
+    }
 }
 
 /// What a text makes.
 #[derive(Debug, Serialize)]
-struct Draft {
-    title: String,
+struct Made {
     description: Description,
     /// Packed picture of the initial state, in base 64.
     frame: String,
@@ -128,7 +131,7 @@ impl Desk {
         let library = self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let source = library.find(id).ok()?;
         let name = id.split_once(':').map_or(id, |p| p.1);
-        let version = id.strip_prefix("file:").map(|_| version(source.text().as_bytes()));
+        let version = id.strip_prefix("file:").map(|_| content_hash(source.text()));
         Some(Opened { name: name.into(), text: source.text().into(), version })
     }
 
@@ -137,24 +140,16 @@ impl Desk {
         match edit {
             Edit::Check { name, text } => check(&SceneSource::new(name, text), status),
             Edit::Drag { text, handle } => match drag::moved(&text, &handle) {
-                Ok((text, said)) => Edited {
-                    text: Some(text),
-                    answer: Some(Answer::yes(said)),
-                    ..Edited::default()
-                },
-                Err(refusal) => Edited { answer: Some(refusal), ..Edited::default() },
+                Ok((text, said)) => Edited { text: Some(text), ..Answer::yes(said).into() },
+                Err(refusal) => refusal.into(),
             },
             Edit::Write { name, text, version } => {
                 match self.write(&name, &text, version.as_deref()) {
-                    Ok(version) => Edited {
-                        version: Some(version),
-                        answer: Some(Answer::yes(format!(
-                            "saved {}",
-                            self.folder.join(&name).display()
-                        ))),
-                        ..Edited::default()
-                    },
-                    Err(refusal) => Edited { answer: Some(refusal), ..Edited::default() },
+                    Ok(version) => {
+                        let said = format!("saved {}", self.folder.join(&name).display());
+                        Edited { version: Some(version), ..Answer::yes(said).into() }
+                    }
+                    Err(refusal) => refusal.into(),
                 }
             }
         }
@@ -184,7 +179,7 @@ impl Desk {
         // The file was checked above; between check and writing it is not locked.
         replace::write(&path, text, replace::Kind::Checked)
             .map_err(|e| Answer::no(e.to_string(), "choose another folder with --dir"))?;
-        Ok(version(text.as_bytes()))
+        Ok(content_hash(text))
     }
 
     /// Refuses to overwrite a file that differs from what the page has read.
@@ -197,7 +192,7 @@ impl Desk {
         };
         let now = std::fs::read(path)
             .map_err(|e| Answer::no(format!("{} cannot be read: {e}", path.display()), ""))?;
-        match version(&now) == known {
+        match content_hash(&now) == known {
             true => Ok(()),
             false => Err(Answer::no(
                 format!("{} was changed by another program since it was opened", path.display()),
@@ -207,42 +202,31 @@ impl Desk {
     }
 }
 
-/// Identifies the content of a file.
-fn version(content: &[u8]) -> String {
-    Sha256::digest(content).iter().map(|b| format!("{b:02x}")).collect()
-}
-
 /// Checks a text: its errors, or what it makes.
 fn check(source: &SceneSource, status: &Status) -> Edited {
-    let made = scene::parse(source)
-        .and_then(|scene| Ok((plan::resolve(&scene).map_err(|e| e.with_source(source))?, scene)));
-    match made {
-        Err(e) => {
-            let problem = Problem::of_scene(source.name(), &e, source);
-            Edited { problem: Some(problem), ..Edited::default() }
-        }
-        Ok((plan, scene)) => match draft(&plan, &scene, status) {
-            Ok(draft) => Edited { draft: Some(draft), ..Edited::default() },
-            Err(cause) => Edited { problem: Some(Problem::of_machine(cause)), ..Edited::default() },
+    let problem = match Draft::new(source.clone()).plan() {
+        Err(e) => Problem::of_scene(source.name(), &e, source),
+        Ok(plan) => match made(&plan, status) {
+            Ok(made) => return Edited { draft: Some(made), ..Edited::default() },
+            Err(cause) => Problem::of_machine(cause),
         },
-    }
+    };
+    Edited { problem: Some(problem), ..Edited::default() }
 }
 
-fn draft(plan: &Plan, scene: &Scene, status: &Status) -> Result<Draft, String> {
+fn made(plan: &Plan, status: &Status) -> Result<Made, String> {
     memory::afford(plan).map_err(|e| e.to_string())?;
-    let info = run_info(plan, &scene.name);
+    let info = run_info(plan, &plan.scene.name);
     let seeded = plan.mesh.cells() * plan.method.seeding.side.pow(2);
-    let mut picture = match seeded <= MOST_SEEDED {
+    let picture = match seeded <= MOST_SEEDED {
         true => snapshot::initial(plan).map_err(|e| e.to_string())?,
         false => crate::frame::Snapshot::default(),
     };
-    picture.particles = thin(&picture.particles, MOST_PARTICLES);
     let unknowns = knobs::unknowns(plan);
-    Ok(Draft {
-        title: scene.name.clone(),
+    Ok(Made {
         description: Description::new(&info),
-        frame: BASE64.encode(pack(&picture, &info)),
-        handles: drag::handles(scene),
+        frame: BASE64.encode(pack(&picture, &info, MOST_PARTICLES)),
+        handles: drag::handles(&plan.scene),
         cells: [plan.mesh.x.cells(), plan.mesh.y.cells()],
         unknowns,
         seconds_per_step: status.expected_step(unknowns),
@@ -254,6 +238,7 @@ fn draft(plan: &Plan, scene: &Scene, status: &Status) -> Result<Draft, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene;
     use crate::testing::TempFolder;
 
     fn desk(folder: &Path) -> Desk {
@@ -280,7 +265,7 @@ mod tests {
             let outside = folder.path().join("secret.toml");
             std::fs::write(&outside, "kept").expect("written");
             std::os::unix::fs::symlink("../secret.toml", inside.join("link.toml")).expect("a link");
-            let known = version(b"kept");
+            let known = content_hash(b"kept");
             assert!(desk.write("link.toml", "lost", Some(&known)).is_err());
             assert_eq!(std::fs::read_to_string(&outside).expect("a file"), "kept");
         }

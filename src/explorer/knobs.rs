@@ -10,7 +10,12 @@ use serde::Serialize;
 
 /// Exponent of the growth of the step time with the number of unknowns, between those of assembly
 /// and factorisation.
-pub const STEP_GROWTH: f64 = 1.3;
+const STEP_GROWTH: f64 = 1.3;
+
+/// Expected step time (s) with `unknowns` unknowns, if it is `seconds` with `known` of them.
+pub fn step_time(seconds: f64, known: usize, unknowns: usize) -> f64 {
+    seconds * (unknowns as f64 / known as f64).powf(STEP_GROWTH)
+}
 
 /// A number of the scene that can be set with a slider.
 #[derive(Clone, Debug, Serialize)]

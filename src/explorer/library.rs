@@ -29,11 +29,9 @@ pub struct Library {
 }
 
 impl Library {
-    /// The presets and the scenes in `folder`.
+    /// The presets and the scenes in `folder`. The list is empty until [`Library::look`].
     pub fn new(folder: PathBuf) -> Library {
-        let mut library = Library { folder, given: None, entries: vec![] };
-        library.look();
-        library
+        Library { folder, given: None, entries: vec![] }
     }
 
     /// Folder of the listed files.
@@ -63,7 +61,6 @@ impl Library {
             return file_id(&name.to_string_lossy());
         }
         self.given = Some(path);
-        self.look();
         given_id(source.name())
     }
 
@@ -163,7 +160,8 @@ mod tests {
         std::fs::write(inside.join("notes.toml"), "colour = 1").expect("written");
         #[cfg(unix)]
         std::os::unix::fs::symlink("../secret.toml", inside.join("link.toml")).expect("a link");
-        let library = Library::new(inside);
+        let mut library = Library::new(inside);
+        library.look();
         let own: Vec<_> = library.entries().iter().filter(|e| !e.preset).collect();
         assert_eq!(own.len(), 1, "{own:?}");
         assert!(library.find("file:mine.toml").is_ok());

@@ -104,8 +104,7 @@ pub fn keep(
     summary.write(&folder).map_err(SaveError::Summary)?;
     plots_of_run(&folder, &live.drive.plan, &live.rows)?;
     let page = at("report.html");
-    let command = format!("grainscope report {}", folder.display());
-    report::write(&[Member::open(&folder)?], Detail::default(), &page, &command)?;
+    report::write(&[Member::open(&folder)?], Detail::default(), &page)?;
     claimed.settle(true);
     let files = folder::FILES.iter().filter_map(|name| {
         let size = std::fs::metadata(at(name)).ok()?.len();

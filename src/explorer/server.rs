@@ -185,7 +185,7 @@ async fn scene(State(site): Shared, Path(id): Path<String>) -> Response {
 
 /// A request of the editor. It is answered beside the session, so it does not wait for a step.
 async fn edit(State(site): Shared, headers: HeaderMap, body: Body) -> Response {
-    let order: Edit = match read(&headers, body, MAX_SCENE).await {
+    let order: Edit = match read(&headers, body).await {
         Ok(order) => order,
         Err(refusal) => return refusal,
     };
@@ -201,19 +201,15 @@ fn refuse(code: StatusCode, answer: &Answer) -> Response {
     (code, [(header::CONTENT_TYPE, "application/json")], text).into_response()
 }
 
-/// Reads a JSON body of at most `most` bytes.
-async fn read<T: DeserializeOwned>(
-    headers: &HeaderMap,
-    body: Body,
-    most: usize,
-) -> Result<T, Response> {
+/// Reads a JSON body of at most [`MAX_SCENE`] bytes.
+async fn read<T: DeserializeOwned>(headers: &HeaderMap, body: Body) -> Result<T, Response> {
     // Forms of other sites cannot send this content type.
     let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok());
     if !kind.is_some_and(|k| k.starts_with("application/json")) {
         let answer = Answer::no("a command must be JSON", "send it as application/json");
         return Err(refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, &answer));
     }
-    let body = match tokio::time::timeout(CLIENT_PATIENCE, to_bytes(body, most)).await {
+    let body = match tokio::time::timeout(CLIENT_PATIENCE, to_bytes(body, MAX_SCENE)).await {
         Ok(Ok(body)) => body,
         Ok(Err(_)) => return Err(StatusCode::PAYLOAD_TOO_LARGE.into_response()),
         Err(_) => return Err(StatusCode::REQUEST_TIMEOUT.into_response()),
@@ -225,7 +221,7 @@ async fn read<T: DeserializeOwned>(
 }
 
 async fn command(State(site): Shared, headers: HeaderMap, body: Body) -> Response {
-    let command: Command = match read(&headers, body, MAX_SCENE).await {
+    let command: Command = match read(&headers, body).await {
         Ok(command) => command,
         Err(refusal) => return refusal,
     };

@@ -119,6 +119,7 @@ impl Session {
     /// Opens the first scene.
     pub fn open(&mut self, source: SceneSource, file: bool, sets: &[String], paused: bool) {
         let id = self.library.give(&source, file);
+        self.library.look();
         let mode = if paused { Mode::Paused } else { Mode::Running };
         let opened = source.with_sets(sets).map(|source| self.begin_scene(&id, source, mode));
         if let Err(e) = opened {

@@ -1,10 +1,10 @@
 //! This module holds the data that pages read: state as JSON, curves, frames and saved files. The
 //! session writes it, and the server can read it at any time.
 
-use super::knobs::STEP_GROWTH;
-use crate::frame::{Frame, RunInfo, Snapshot};
+use super::knobs::step_time;
+use crate::frame::{Frame, RunInfo};
 use crate::light::Description;
-use crate::light::pack::{pack, thin};
+use crate::light::pack::{MOST_PARTICLES, pack};
 use crate::plan::Plan;
 use crate::sim::row::{Place, Row, places};
 use crate::web::stream::Stream;
@@ -49,12 +49,9 @@ pub struct Status {
     streams: Mutex<HashMap<String, Arc<Stream>>>,
 }
 
-/// Maximum number of particles in a frame of the light view.
-const MOST_PARTICLES: usize = 20_000;
-
 /// The frames of a run that have pictures.
 struct Film {
-    info: RunInfo,
+    info: Arc<RunInfo>,
     frames: Vec<Arc<Frame>>,
 }
 
@@ -134,7 +131,9 @@ impl Status {
     pub fn film(&self, run: u64, info: &RunInfo, frames: &[Arc<Frame>]) {
         let drawn = frames.iter().filter(|f| f.snapshot.is_some()).cloned().collect();
         let mut films = lock(&self.films);
-        let film = films.entry(run).or_insert_with(|| Film { info: info.clone(), frames: vec![] });
+        let film = films
+            .entry(run)
+            .or_insert_with(|| Film { info: Arc::new(info.clone()), frames: vec![] });
         film.frames = drawn;
     }
 
@@ -158,12 +157,7 @@ impl Status {
             let frame = film.frames.iter().rev().find(|f| f.step == step)?;
             (film.info.clone(), frame.clone())
         };
-        let snapshot = frame.snapshot.as_ref()?;
-        if snapshot.particles.positions.len() <= MOST_PARTICLES {
-            return Some(pack(snapshot, &info));
-        }
-        let particles = thin(&snapshot.particles, MOST_PARTICLES);
-        Some(pack(&Snapshot { particles, ..snapshot.clone() }, &info))
+        Some(pack(frame.snapshot.as_ref()?, &info, MOST_PARTICLES))
     }
 
     /// Notes the number of unknowns and the step time (s) of the run.
@@ -173,8 +167,8 @@ impl Status {
 
     /// Expected step time (s) of a scene with this number of unknowns; `None` if no run was timed.
     pub fn expected_step(&self, unknowns: usize) -> Option<f64> {
-        let (of, seconds) = (*lock(&self.pace))?;
-        let expected = seconds * (unknowns as f64 / of as f64).powf(STEP_GROWTH);
+        let (known, seconds) = (*lock(&self.pace))?;
+        let expected = step_time(seconds, known, unknowns);
         expected.is_finite().then_some(expected)
     }
 

@@ -74,11 +74,10 @@ fn fields(n: usize, instant: &Instant) -> Option<Group> {
     let first = instant.fields.first()?;
     let rows = first.nx * first.ny;
     let mut group = stamp(n, instant, rows);
-    let centre = |c: usize, i: usize| first.origin[c] + (i as f32 + 0.5) * first.cell[c];
-    let x = (0..rows).map(|k| centre(0, k % first.nx)).collect();
-    let y = (0..rows).map(|k| centre(1, k / first.nx)).collect();
-    group.push(("x".into(), Column::Single(x)));
-    group.push(("y".into(), Column::Single(y)));
+    for (c, name) in ["x", "y"].into_iter().enumerate() {
+        let values = (0..rows).map(|k| first.centre(k)[c]).collect();
+        group.push((name.into(), Column::Single(values)));
+    }
     let values = |f: &crate::frame::GridField| (f.name.clone(), Column::Single(f.values.clone()));
     group.extend(instant.fields.iter().map(values));
     Some(group)

@@ -37,8 +37,8 @@ fn fields(instant: &Instant) -> Option<String> {
     let names: Vec<&str> = instant.fields.iter().map(|f| f.name.as_str()).collect();
     let mut text = format!("x,y,{}\n", names.join(","));
     for k in 0..first.nx * first.ny {
-        let centre = |c: usize, i: usize| first.origin[c] + (i as f32 + 0.5) * first.cell[c];
-        let _ = write!(text, "{},{}", centre(0, k % first.nx), centre(1, k / first.nx));
+        let [x, y] = first.centre(k);
+        let _ = write!(text, "{x},{y}");
         for field in &instant.fields {
             let _ = write!(text, ",{}", field.values[k]);
         }

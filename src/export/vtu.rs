@@ -3,6 +3,7 @@
 
 use super::{ExportError, Frames, Instant, write_file};
 use crate::frame::{GridField, ParticleSnapshot};
+use crate::record::text::escape;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::Path;
@@ -100,7 +101,7 @@ fn fields(fields: &[GridField]) -> Grid {
 fn array(name: &str, kind: &str, components: usize, bytes: Vec<u8>) -> String {
     let mut block = (bytes.len() as u64).to_le_bytes().to_vec();
     block.extend(bytes);
-    let name = name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
+    let name = escape(name);
     format!(
         "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" \
          format=\"binary\">{}</DataArray>\n",

@@ -2,9 +2,10 @@
 //! them as images or films.
 
 use super::DRAWING;
-use super::reel::Reel;
+use super::reel::{Ranges, Reel, widen};
 use super::surface::Surface;
 use crate::record::replace::{self, Kind, ReplaceError, may_replace};
+use crate::results::later;
 use rquickjs::{CatchResultExt, Context, Ctx, Function, Object, Runtime, TypedArray};
 use serde::Serialize;
 use std::cell::RefCell;
@@ -81,10 +82,9 @@ impl Studio {
         let context = Context::full(&Runtime::new().map_err(failed)?).map_err(failed)?;
         let script = |e: serde_json::Error| FilmError::Script(e.to_string());
         let descriptions: Vec<_> = reels.iter().map(|r| &r.description).collect();
-        let mut ranges = reels.first().map(|r| r.ranges.clone()).unwrap_or_default();
+        let mut ranges = Ranges::new();
         for (name, range) in reels.iter().flat_map(|r| &r.ranges) {
-            let all = ranges.entry(name.clone()).or_insert(*range);
-            *all = [all[0].min(range[0]), all[1].max(range[1])];
+            widen(&mut ranges, name, *range);
         }
         let setup = format!(
             "const runs = {}; const look = {{ ...LOOK, ...{}, range: {} }};\n\
@@ -99,7 +99,7 @@ impl Studio {
             size[0],
             size[1],
         );
-        // Text has the size that it has in a page of 900 pixels.
+        // Text has the size that it has in a picture of 720 pixels.
         let unit = f64::from(size[0].min(size[1])) / 720.0;
         context.with(|ctx| {
             let loaded = bind(&ctx, &surface)
@@ -124,7 +124,7 @@ impl Studio {
             let shown = || -> rquickjs::Result<()> {
                 let (mut frames, mut times) = (vec![], vec![]);
                 for reel in &self.reels {
-                    let next = reel.frames.partition_point(|f| f.0 <= time * (1.0 + 1e-9));
+                    let next = reel.frames.partition_point(|f| !later(f.0, time));
                     let (at, bytes) = &reel.frames[next.saturating_sub(1)];
                     frames.push(TypedArray::<u8>::new(ctx.clone(), bytes.as_slice())?);
                     times.push(*at);
@@ -210,16 +210,8 @@ impl Studio {
         fps: f64,
         each: &mut dyn FnMut(usize),
     ) -> Result<Vec<PathBuf>, FilmError> {
-        may_replace(path, Kind::Mp4)?;
-        let part = replace::beside(path, &format!(".{}.part", std::process::id()));
-        let encoded = self.encode(&part, fps, each);
-        let moved =
-            encoded.and_then(|()| std::fs::rename(&part, path).map_err(|e| unwritten(path, &e)));
-        if moved.is_err() {
-            // What was written is of no use; if it cannot be removed it does no harm.
-            let _ = std::fs::remove_file(&part);
-        }
-        moved.map(|()| vec![path.to_owned()])
+        replace::make(path, Kind::Mp4, |part| self.encode(part, fps, each))?;
+        Ok(vec![path.to_owned()])
     }
 
     /// Sends all frames to FFmpeg.

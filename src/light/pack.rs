@@ -14,7 +14,7 @@
 //! | strokes | x and y of both ends in turn: differences, zigzag, high bytes, low bytes |
 //! | field | `u16` index in the list of fields, width, height, 0; `f32` smallest and largest value, ends of the colour scale; differences from the left neighbour, zigzag, high bytes, low bytes |
 
-use crate::frame::{GridField, ParticleSnapshot, Rect, RunInfo, Snapshot};
+use crate::frame::{GridField, ParticleSnapshot, Rect, RunInfo, Snapshot, extent};
 
 /// Number of steps of a quantised value of a field; the number after the last step is "no value".
 const FIELD_STEPS: f32 = 4094.0;
@@ -24,10 +24,18 @@ const NO_VALUE: u16 = 4095;
 /// of the domain, whichever is larger.
 const RADIUS_STEPS: f32 = 8.0;
 
+/// Number of particles up to which all of a frame are packed, unless more are asked for.
+pub const MOST_PARTICLES: usize = 20_000;
+
+/// The number `n` such that at most `most` particles remain if every `n`-th of `count` is kept.
+pub fn spacing(count: usize, most: usize) -> usize {
+    count.div_ceil(most.max(1)).max(1)
+}
+
 /// A copy of particles with at most `most` of them, evenly chosen. Radii grow so that the area
 /// stays the same.
-pub fn thin(particles: &ParticleSnapshot, most: usize) -> ParticleSnapshot {
-    let every = particles.positions.len().div_ceil(most.max(1)).max(1);
+fn thin(particles: &ParticleSnapshot, most: usize) -> ParticleSnapshot {
+    let every = spacing(particles.positions.len(), most);
     let growth = (every as f32).sqrt();
     ParticleSnapshot {
         positions: particles.positions.iter().copied().step_by(every).collect(),
@@ -37,24 +45,21 @@ pub fn thin(particles: &ParticleSnapshot, most: usize) -> ParticleSnapshot {
     }
 }
 
-/// Packs a snapshot. Fields that the run does not list are left out.
-pub fn pack(snapshot: &Snapshot, info: &RunInfo) -> Vec<u8> {
+/// Packs a snapshot with at most `most` of its particles. Fields that the run does not list are left
+/// out.
+pub fn pack(snapshot: &Snapshot, info: &RunInfo, most: usize) -> Vec<u8> {
+    let thinned = thin(&snapshot.particles, most);
     let listed = |f: &GridField| info.fields.iter().position(|q| q.name == f.name);
     let fields: Vec<(usize, &GridField)> =
         snapshot.fields.iter().filter_map(|f| Some((listed(f)?, f))).collect();
     let lines = &snapshot.dye_lines;
     let points = lines.iter().map(Vec::len).sum::<usize>();
-    let counts = [
-        snapshot.particles.positions.len(),
-        lines.len(),
-        points,
-        snapshot.glyphs.len(),
-        fields.len(),
-    ];
+    let counts =
+        [thinned.positions.len(), lines.len(), points, snapshot.glyphs.len(), fields.len()];
     let mut out = vec![];
     counts.iter().for_each(|&n| out.extend((n as u32).to_le_bytes()));
     let place = Place { domain: info.domain };
-    particles(&snapshot.particles, place, info.particle_radius, &mut out);
+    particles(&thinned, place, info.particle_radius, &mut out);
     lines.iter().for_each(|line| out.extend((line.len() as u32).to_le_bytes()));
     differences(lines.iter().flatten().map(|p| place.at(*p)), &mut out);
     differences(snapshot.glyphs.iter().flatten().map(|p| place.at(*p)), &mut out);
@@ -137,9 +142,7 @@ fn differences(points: impl Iterator<Item = [u16; 2]>, out: &mut Vec<u8>) {
 }
 
 fn pack_field(index: usize, field: &GridField, out: &mut Vec<u8>) {
-    let finite = || field.values.iter().copied().filter(|v| v.is_finite());
-    let low = finite().reduce(f32::min).unwrap_or(0.0);
-    let high = finite().reduce(f32::max).unwrap_or(0.0);
+    let [low, high] = extent(&field.values).unwrap_or([0.0; 2]);
     let whole = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
     for n in [whole(index), whole(field.nx), whole(field.ny), 0] {
         out.extend(n.to_le_bytes());

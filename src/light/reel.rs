@@ -1,11 +1,14 @@
 //! This module reads the frames of a finished run and packs them for reports and films.
 
 use super::Description;
-use super::pack::{pack, thin};
-use crate::frame::{GridField, RunInfo, Snapshot};
+use super::pack::{MOST_PARTICLES, pack, spacing};
+use crate::frame::{GridField, Snapshot, extent};
 use crate::results::{Member, SAME_TIME};
 use indexmap::IndexMap;
 use std::path::PathBuf;
+
+/// Number of frames up to which all of a run are kept, unless more are asked for.
+pub const MOST_FRAMES: usize = 200;
 
 /// Error of reading the frames of a run.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +21,9 @@ pub enum ReelError {
     NoPictures(PathBuf),
 }
 
+/// Ends of the colour scales of fields, by name.
+pub type Ranges = IndexMap<String, [f32; 2]>;
+
 /// The packed frames of a run.
 pub struct Reel {
     /// Constant data of the run.
@@ -25,7 +31,7 @@ pub struct Reel {
     /// Time (s) and packed frame, in order.
     pub frames: Vec<(f64, Vec<u8>)>,
     /// Ends of the colour scale of each field over all frames.
-    pub ranges: IndexMap<String, [f32; 2]>,
+    pub ranges: Ranges,
     /// Number of frames of the recording that have a picture.
     pub pictures: usize,
     /// Largest number of particles in a frame of the recording.
@@ -47,7 +53,7 @@ pub struct Detail {
 
 impl Default for Detail {
     fn default() -> Self {
-        Detail { frames: 200, particles: 20_000, samples: 128 }
+        Detail { frames: MOST_FRAMES, particles: MOST_PARTICLES, samples: 128 }
     }
 }
 
@@ -66,7 +72,7 @@ impl Reel {
         let mut reel = Reel {
             description: Description::new(info),
             frames: vec![],
-            ranges: IndexMap::new(),
+            ranges: Ranges::new(),
             pictures: particles.len(),
             recorded: particles.iter().map(|(_, p)| p.positions.len()).max().unwrap_or(0),
             kept: 0,
@@ -74,22 +80,22 @@ impl Reel {
         for k in evenly(particles.len(), detail.frames) {
             let (time, particles) = &particles[k];
             let snapshot = Snapshot {
-                particles: thin(particles, detail.particles),
+                particles: particles.clone(),
                 dye_lines: at(&dye, *time).cloned().unwrap_or_default(),
                 glyphs: at(&glyphs, *time).cloned().unwrap_or_default(),
                 fields: fields
                     .iter()
                     .filter_map(|list| at(list, *time))
-                    .map(|field| coarse(field, detail.samples, info))
+                    .map(|field| coarse(field, detail.samples))
                     .collect(),
                 ..Snapshot::default()
             };
-            reel.kept = reel.kept.max(snapshot.particles.positions.len());
+            let count = particles.positions.len();
+            reel.kept = reel.kept.max(count.div_ceil(spacing(count, detail.particles)));
             for field in &snapshot.fields {
-                let range = reel.ranges.entry(field.name.clone()).or_insert(field.range);
-                *range = [range[0].min(field.range[0]), range[1].max(field.range[1])];
+                widen(&mut reel.ranges, &field.name, field.range);
             }
-            reel.frames.push((*time, pack(&snapshot, info)));
+            reel.frames.push((*time, pack(&snapshot, info, detail.particles)));
         }
         match reel.frames.is_empty() {
             true => Err(ReelError::NoPictures(member.path.clone())),
@@ -114,29 +120,22 @@ fn at<T>(list: &[(f64, T)], time: f64) -> Option<&T> {
     list.get(k).filter(|(t, _)| *t <= time + SAME_TIME * time.abs()).map(|(_, value)| value)
 }
 
-/// A field on at most `samples` samples along its longer side, with the ends of its colour scale.
-fn coarse(field: &GridField, samples: usize, info: &RunInfo) -> GridField {
+/// Widens the ends of the colour scale of a field so that they contain a range.
+pub fn widen(ranges: &mut Ranges, field: &str, range: [f32; 2]) {
+    let ends = ranges.entry(field.into()).or_insert(range);
+    *ends = [ends[0].min(range[0]), ends[1].max(range[1])];
+}
+
+/// A field on at most `samples` samples along its longer side. Its colour scale has the ends of its
+/// values; painters make the scale of a quantity with a sign symmetric.
+fn coarse(field: &GridField, samples: usize) -> GridField {
     let every = field.nx.max(field.ny).div_ceil(samples.max(1)).max(1);
     let mut coarse = match every {
         1 => field.clone(),
         _ => field.on(field.rect(), field.nx.div_ceil(every), field.ny.div_ceil(every)),
     };
-    let signed = info.fields.iter().any(|q| q.name == field.name && q.signed);
-    coarse.range = range(&coarse.values, signed);
+    coarse.range = extent(&coarse.values).unwrap_or([0.0, 1.0]);
     coarse
-}
-
-/// The smallest and largest finite value; symmetric about zero if the sign matters.
-fn range(values: &[f32], signed: bool) -> [f32; 2] {
-    let finite = || values.iter().copied().filter(|v| v.is_finite());
-    let low = finite().reduce(f32::min).unwrap_or(0.0);
-    let high = finite().reduce(f32::max).unwrap_or(1.0);
-    if signed {
-        let reach = low.abs().max(high.abs());
-        [-reach, reach]
-    } else {
-        [low, high]
-    }
 }
 
 #[cfg(test)]

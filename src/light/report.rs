@@ -1,9 +1,10 @@
 //! This module writes reports: one page with the light view, curves and results of runs, which
 //! opens from a disk without a server or network.
 
-use super::reel::{Detail, Reel, ReelError};
+use super::reel::{Detail, Ranges, Reel};
 use super::{BASE_STYLE, CANVAS, DRAWING, Description, STYLE, VIEW};
 use crate::record::replace::{self, Kind, ReplaceError};
+use crate::record::text::escape;
 use crate::results::Member;
 use crate::sim::row;
 use base64::Engine;
@@ -55,7 +56,7 @@ struct Run {
     times: Vec<f64>,
     /// Compressed packed frames, in base 64.
     frames: Vec<String>,
-    ranges: IndexMap<String, [f32; 2]>,
+    ranges: Ranges,
     #[serde(skip_serializing_if = "Option::is_none")]
     series: Option<Series>,
     /// Text of `summary.json`; `None` if there is none.
@@ -73,11 +74,8 @@ struct Series {
     points: Vec<Vec<f64>>,
 }
 
-/// Makes the page of runs; `command` is the command that made it.
-///
-/// # Errors
-/// A value cannot be encoded.
-pub fn page(members: &[Member], detail: Detail, command: &str) -> Result<String, ReportError> {
+/// The page of runs; `command` is the command that makes it.
+fn page(members: &[Member], detail: Detail, command: &str) -> Result<String, ReportError> {
     let encode = |e: &dyn std::fmt::Display| ReportError::Encode(e.to_string());
     let (mut runs, mut notes) = (vec![], vec![]);
     for member in members {
@@ -124,18 +122,15 @@ pub fn page(members: &[Member], detail: Detail, command: &str) -> Result<String,
     ))
 }
 
-/// Writes the page of runs to a file.
+/// Writes the page of runs to a file. Returns its size (bytes).
 ///
 /// # Errors
-/// See [`page`]; or a file of another kind is in the way.
-pub fn write(
-    members: &[Member],
-    detail: Detail,
-    path: &Path,
-    command: &str,
-) -> Result<u64, ReportError> {
+/// A file of another kind is in the way, or a value cannot be encoded.
+pub fn write(members: &[Member], detail: Detail, path: &Path) -> Result<u64, ReportError> {
     replace::may_replace(path, Kind::Page)?;
-    let page = page(members, detail, command)?;
+    let runs: Vec<String> = members.iter().map(|m| m.path.display().to_string()).collect();
+    let command = format!("grainscope report {} -o {}", runs.join(" "), path.display());
+    let page = page(members, detail, &command)?;
     replace::write(path, &page, Kind::Page)?;
     Ok(page.len() as u64)
 }
@@ -143,20 +138,14 @@ pub fn write(
 /// The data of a run, and what is to be said about its frames.
 fn run(member: &Member, detail: Detail) -> std::io::Result<(Run, Option<String>)> {
     let mut notes = member.notes.clone();
-    let reel = match Reel::of(member, detail) {
-        Ok(reel) => Some(reel),
-        Err(e @ (ReelError::NoRecording(_) | ReelError::NoPictures(_))) => {
-            notes.push(e.to_string());
-            None
-        }
-    };
+    let reel = Reel::of(member, detail).map_err(|e| notes.push(e.to_string())).ok();
     let note = reel.as_ref().map(|reel| about_frames(reel, &member.name));
     let mut run = Run {
         name: member.name.clone(),
         description: None,
         times: vec![],
         frames: vec![],
-        ranges: IndexMap::new(),
+        ranges: Ranges::new(),
         series: member.table.as_ref().map(|t| series(&t.columns)),
         summary: member.summary_text().map(String::from),
         values: member.values_at(member.end).unwrap_or_default(),
@@ -230,10 +219,6 @@ fn fill(page: &str, parts: &[(&str, &str)]) -> String {
         }
     }
     out + rest
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -36,6 +36,19 @@ pub fn trim_zeros(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
+/// Tick spacing of 1, 2 or 5 times a power of ten that gives about five to ten ticks.
+pub fn nice_step(span: f64) -> f64 {
+    let decade = 10f64.powf((span / 10.0).log10().floor());
+    let share = span / 10.0 / decade;
+    let digit = match share {
+        s if s <= 1.0 => 1.0,
+        s if s <= 2.0 => 2.0,
+        s if s <= 5.0 => 5.0,
+        _ => 10.0,
+    };
+    (digit * decade).max(f64::MIN_POSITIVE)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -296,8 +296,9 @@ impl Drawing for Panels<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::scale::{axis_label, nice_step};
+    use super::scale::axis_label;
     use super::*;
+    use crate::record::number::nice_step;
 
     #[test]
     fn axis_labels_contain_the_power_of_ten() {

@@ -132,12 +132,30 @@ pub fn write(path: &Path, content: impl AsRef<[u8]>, kind: Kind) -> Result<(), R
     if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
         return fs::write(path, content).map_err(fault);
     }
+    make(path, kind, |part| fs::write(part, content).map_err(fault))
+}
+
+/// Makes a file, which may replace one of the same kind: `fill` writes the new content to a path beside
+/// it.
+///
+/// # Errors
+/// See [`may_replace`]; those of `fill`; or the new file cannot take its place.
+pub fn make<E: From<ReplaceError>>(
+    path: &Path,
+    kind: Kind,
+    fill: impl FnOnce(&Path) -> Result<(), E>,
+) -> Result<(), E> {
+    may_replace(path, kind)?;
     let part = beside(path, &format!(".{}.part", std::process::id()));
-    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, path));
-    written.map_err(|source| {
+    let moved = fill(&part).and_then(|()| {
+        let fault = |source| ReplaceError::Write { path: path.to_owned(), source };
+        fs::rename(&part, path).map_err(|source| fault(source).into())
+    });
+    if moved.is_err() {
+        // If the part cannot be removed it does no harm.
         let _ = fs::remove_file(&part);
-        fault(source)
-    })
+    }
+    moved
 }
 
 /// A path with a suffix appended to its name.

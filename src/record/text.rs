@@ -105,3 +105,8 @@ pub fn duration(seconds: f64) -> String {
         format!("{:.1} h", seconds / 3600.0)
     }
 }
+
+/// A text for a page or an XML file, outside of tags or in the value of an attribute.
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

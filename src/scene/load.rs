@@ -270,7 +270,12 @@ pub fn to_toml(scene: &Scene) -> String {
 
 /// Identifier of a scene's content: the SHA-256 hash of [`to_toml`], in hexadecimal digits.
 pub fn scene_hash(scene: &Scene) -> String {
-    Sha256::digest(to_toml(scene)).iter().map(|byte| format!("{byte:02x}")).collect()
+    content_hash(to_toml(scene))
+}
+
+/// SHA-256 hash of a content, in hexadecimal digits.
+pub fn content_hash(content: impl AsRef<[u8]>) -> String {
+    Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Whether a name can be that of a single folder everywhere: 1 to 100 letters, digits, `_` and `-`.

@@ -18,7 +18,9 @@ pub mod source;
 pub mod types;
 
 pub use error::{Place, SceneError, closest};
-pub use load::{SCHEMA, is_folder_name, json_schema, load, parse, scene_hash, to_toml};
+pub use load::{
+    SCHEMA, content_hash, is_folder_name, json_schema, load, parse, scene_hash, to_toml,
+};
 pub use quantity::{Field, FieldFn, Quantity};
 pub use scope::Scope;
 pub use source::SceneSource;

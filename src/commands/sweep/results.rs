@@ -1,10 +1,10 @@
 //! Collects and compares the cases of a sweep.
 
-use super::super::report::write as write_report;
 use super::super::{Failure, compare as comparison, print};
 use super::*;
 use crate::compare;
 use crate::light::reel::Detail;
+use crate::light::report as page;
 use crate::record::rerun_log::Sink;
 use crate::results::Member;
 use crate::sweep::collect::Collection;
@@ -28,17 +28,19 @@ pub(super) fn collect(
     }
     let mut text = found.terminal();
     text += &format!("\n{} of {} cases are done\n", found.done(), list.cases.len());
-    let cases = match side_by_side {
-        Some(named) if !named.is_empty() => chosen(list, named)?,
-        _ => of_first_seed(store, list),
-    };
-    if side_by_side.is_some() && cases.len() > 1 {
-        files.push(beside(store, &cases)?);
-    }
-    if report && !cases.is_empty() {
-        let page = store.root().join("report.html");
-        write_report(&members(store, &cases)?, Detail::default(), &page)?;
-        files.push(page);
+    if side_by_side.is_some() || report {
+        let cases = match side_by_side {
+            Some(named) if !named.is_empty() => chosen(list, named)?,
+            _ => of_first_seed(store, list),
+        };
+        if side_by_side.is_some() && cases.len() > 1 {
+            files.push(beside(store, &cases)?);
+        }
+        if report && !cases.is_empty() {
+            let path = store.root().join("report.html");
+            page::write(&members(store, &cases)?, Detail::default(), &path)?;
+            files.push(path);
+        }
     }
     for file in files {
         text += &format!("wrote {}\n", file.display());

@@ -1,6 +1,7 @@
 //! This module finds what can be dragged in the picture of a scene, and moves it in the text.
 
 use super::super::protocol::Answer;
+use crate::record::number::nice_step;
 use crate::scene::{self, Quantity, Scene, SceneSource, Scope, Shape};
 use serde::{Deserialize, Serialize};
 use toml_edit::{Array, DocumentMut, Item, Value};
@@ -9,6 +10,8 @@ use toml_edit::{Array, DocumentMut, Item, Value};
 const SAME: f64 = 1e-9;
 /// Steps of the domain's size to which dragged coordinates are rounded.
 const ROUNDING: f64 = 500.0;
+/// Number of ticks of an axis, of which [`nice_step`] gives the spacing.
+const STEPS_OF_AXIS: f64 = 10.0;
 
 /// Something that can be dragged: a segment between two points, or a rectangle between its lower
 /// left and upper right corner.
@@ -114,10 +117,11 @@ pub fn moved(text: &str, to: &Place) -> Result<(String, String), Answer> {
     let mut changes = vec![];
     for (p, coordinates) in to.key.coordinates().iter().enumerate() {
         for (c, (path, component)) in coordinates.iter().enumerate() {
-            let value = rounded(to.points[p][c], size);
-            if !value.is_finite() || (value - before[p][c]).abs() <= SAME * size {
+            let (wanted, now) = (to.points[p][c], before[p][c]);
+            if !wanted.is_finite() || (wanted - now).abs() <= SAME * size {
                 continue;
             }
+            let value = rounded(wanted, size);
             let array = part(&mut doc, to.key, to.index)
                 .and_then(|item| path.iter().try_fold(item, |item, key| item.get_mut(key)))
                 .and_then(Item::as_array_mut)
@@ -137,13 +141,7 @@ pub fn moved(text: &str, to: &Place) -> Result<(String, String), Answer> {
 
 /// Rounds to a step of 1, 2 or 5 times a power of ten below the size of the domain.
 fn rounded(value: f64, size: f64) -> f64 {
-    let finest = size / ROUNDING;
-    let power = 10f64.powf(finest.log10().floor());
-    let step = [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|k| k * power)
-        .find(|s| *s >= finest)
-        .unwrap_or(10.0 * power);
+    let step = nice_step(size * STEPS_OF_AXIS / ROUNDING);
     let steps = (value / step).round();
     // Divided by a whole number where possible, so that decimals are short.
     let inverse = (1.0 / step).round();
@@ -194,6 +192,16 @@ mod tests {
         );
         assert_eq!(said, "gauges of outflow: to[0] = 0.8");
         assert_eq!(handle(&text, "outflow").points[1], [0.8, 3.0]);
+    }
+
+    #[test]
+    fn what_is_not_dragged_is_not_rounded() {
+        let silo = presets::find("silo").expect("a preset");
+        let text = silo.text().replace(r#""fill_height*aperture""#, r#""20/3""#);
+        let mut to = handle(&text, "grains");
+        to.points[0][0] = -1.5;
+        let (moved, _) = moved(&text, &to).expect("moved");
+        assert!(moved.contains(r#""20/3""#), "{moved}");
     }
 
     #[test]

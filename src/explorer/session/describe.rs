@@ -182,8 +182,8 @@ impl Session {
         let cells = live.map(|l| l.values.scene.accuracy.cells);
         let guess = || {
             let live = live.filter(|l| l.rows.len() > 1)?;
-            let ratio = s.unknowns as f64 / knobs::unknowns(&live.drive.plan) as f64;
-            Some(live.usual_step() * ratio.powf(knobs::STEP_GROWTH))
+            let known = knobs::unknowns(&live.drive.plan);
+            Some(knobs::step_time(live.usual_step(), known, s.unknowns))
         };
         DialState {
             cells: s.cells,

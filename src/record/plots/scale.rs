@@ -1,6 +1,6 @@
 //! Scales of axes: ranges, ticks and labels.
 
-use super::super::number::{engineering_exponent, trim_zeros};
+use super::super::number::{engineering_exponent, nice_step, trim_zeros};
 use super::*;
 
 /// An axis with its range and ticks, computed from the data.
@@ -99,19 +99,6 @@ impl Scale {
     pub(super) fn place_of_tick(&self, tick: f64) -> f64 {
         (tick - self.low) / (self.high - self.low)
     }
-}
-
-/// Tick spacing of 1, 2 or 5 times a power of ten that gives about five to ten ticks.
-pub(super) fn nice_step(span: f64) -> f64 {
-    let decade = 10f64.powf((span / 10.0).log10().floor());
-    let share = span / 10.0 / decade;
-    let digit = match share {
-        s if s <= 1.0 => 1.0,
-        s if s <= 2.0 => 2.0,
-        s if s <= 5.0 => 5.0,
-        _ => 10.0,
-    };
-    (digit * decade).max(f64::MIN_POSITIVE)
 }
 
 /// Formats a power of ten.

@@ -57,15 +57,14 @@ impl RerunLog {
         }
         // A single material needs no legend; with a particle quantity, a colour bar is in its place.
         // Names of gauges would cover the flow beside the gauges.
-        let drawn = info.materials.iter().filter(|material| material.drawn);
-        let gauges = info.gauges.iter().map(|gauge| (gauge.name.as_str(), GAUGE));
-        let bar = info.particle_quantity.is_some();
-        let materials = if bar || drawn.clone().count() < 2 { 0 } else { usize::MAX };
-        let entries: Vec<(&str, [u8; 3])> = drawn
-            .take(materials)
-            .map(|material| (material.name.as_str(), material.rgb))
-            .chain(gauges.filter(|_| !bar))
-            .collect();
+        let mut entries: Vec<(&str, [u8; 3])> = vec![];
+        if info.particle_quantity.is_none() {
+            let drawn: Vec<_> = info.materials.iter().filter(|material| material.drawn).collect();
+            if drawn.len() > 1 {
+                entries.extend(drawn.iter().map(|m| (m.name.as_str(), m.rgb)));
+            }
+            entries.extend(info.gauges.iter().map(|gauge| (gauge.name.as_str(), GAUGE)));
+        }
         if !entries.is_empty() {
             let row = colour_bar::row(info.domain, entries.len());
             self.rec.log_static(

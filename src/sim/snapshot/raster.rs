@@ -1,6 +1,6 @@
 //! This module holds the regular grids on which fields are drawn, and computes isolines on them.
 
-use crate::frame::{GridField, Isoline};
+use crate::frame::{GridField, Isoline, extent};
 use crate::plan::Plan;
 use crate::space::mesh::{Axis, Mesh};
 use crate::space::shape::Shape;
@@ -75,10 +75,7 @@ pub(super) struct Stand {
 
 /// Smallest and largest finite value; `[0, 1]` if they are equal or there is none.
 pub(super) fn range(values: &[f32]) -> [f32; 2] {
-    let finite = || values.iter().copied().filter(|v| v.is_finite());
-    let (low, high) =
-        (finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max));
-    if low < high { [low, high] } else { [0.0, 1.0] }
+    extent(values).filter(|[low, high]| low < high).unwrap_or([0.0, 1.0])
 }
 
 /// The smallest range that is symmetric about zero and contains a range.
