@@ -61,16 +61,16 @@ fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
             let (s, c) = f.at(si[0], si[1]).to_radians().sin_cos();
             orientation.add(1.0, [c, s]);
         }
-        (material.law.at(&Here::at_rest(eta, &orientation)), density, eta)
+        (material.law.at(&Here::without_flow(eta, &orientation)), density, eta)
     });
     let mut load = plan.fixed_loads::<D>();
     let masses = Masses::Points(&quadrature);
     add_acceleration(plan, masses, &mut load);
     add_gravity(plan, plan.state.gravity, masses, &mut load);
-    let constraints = plan.boundary.constraints::<D>(mesh, &plan.units);
+    let mut constraints = plan.boundary.constraints::<D>(mesh, &plan.units);
+    constraints.refer(plan.pressure_reference);
     let mut stokes = Stokes::new(mesh.clone(), constraints);
-    let stopping =
-        Stopping { tolerance: plan.method.tolerance, max_corrections: plan.method.max_corrections };
+    let stopping = Stopping::of(&plan.method);
     let loads = Loads { nodal: &load, terms: &Terms::default() };
     let mut flow = Flow::zero(mesh);
     stokes.solve(&quadrature, loads, stopping, &mut flow).map_err(|source| SimError::Solve {

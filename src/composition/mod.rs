@@ -36,6 +36,12 @@ pub enum Content {
         /// Number of changes of the material table.
         version: u32,
     },
+    /// One material whose law depends on the flow, but not on its particles; evaluated in every
+    /// solution.
+    Flowing {
+        /// Index of the material.
+        material: u8,
+    },
     /// Any other content; evaluated in every step.
     Mixed,
     /// A solid block.
@@ -44,11 +50,20 @@ pub enum Content {
     Unknown,
 }
 
+impl Content {
+    /// Whether equal contents have equal laws at all times.
+    pub fn is_constant(self) -> bool {
+        !matches!(self, Content::Mixed | Content::Flowing { .. })
+    }
+}
+
 /// Properties of a material that the composition needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
     /// Whether its law and density are constants.
     pub uniform: bool,
+    /// Whether its law depends on the flow, and on nothing that particles carry.
+    pub flowing: bool,
     /// Whether its law depends on directors.
     pub directors: bool,
     /// Whether its particles carry a viscosity.
@@ -163,7 +178,7 @@ impl Composition {
             })?;
             let mixed = moving && !particles.of_cell(cell).is_empty();
             let content = if mixed { Content::Mixed } else { content };
-            let unchanged = content != Content::Mixed && content == self.content[cell];
+            let unchanged = content.is_constant() && content == self.content[cell];
             self.content[cell] = content;
             self.fresh[cell] = !unchanged;
         }
@@ -220,6 +235,8 @@ fn content(
     let single = particles.material[range].iter().all(|&m| m == first);
     Some(if single && kinds[first as usize].uniform {
         Content::Uniform { material: first, version }
+    } else if single && kinds[first as usize].flowing {
+        Content::Flowing { material: first }
     } else {
         Content::Mixed
     })

@@ -12,6 +12,7 @@
 
 pub mod cosserat;
 pub mod director;
+pub mod flow_curve;
 pub mod granular;
 pub mod layered;
 pub mod mixture;
@@ -21,8 +22,9 @@ pub mod rates;
 
 use cosserat::Cosserat;
 use director::Orientation;
+use flow_curve::FlowCurve;
 use point::PointLaw;
-use rates::Rates;
+use rates::{Rates, Stress};
 
 /// Variables on which the law of a material depends. The solver evaluates the law again where one
 /// of them may have changed.
@@ -70,26 +72,46 @@ pub struct Law {
     pub rotation: Option<Cosserat>,
     /// Compliance 1/B, 1/(Pa s); zero if incompressible.
     pub compliance: f64,
+    /// Flow curve of a generalised fluid; `None` if the viscosity does not depend on the flow. With
+    /// a flow curve, the viscosities of `shear` and `rotation` are relative to the shear viscosity.
+    pub curve: Option<FlowCurve>,
+}
+
+/// Rates and pressure at a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LocalFlow {
+    /// Deformation rates.
+    pub rates: Rates,
+    /// Pressure, Pa.
+    pub pressure: f64,
 }
 
 /// The state of a material at an integration point.
 #[derive(Clone, Copy, Debug)]
 pub struct Here<'a> {
-    /// Shear viscosity eta, Pa s.
+    /// Shear viscosity eta, Pa s; for a generalised fluid, the viscosity where no flow is known.
     pub viscosity: f64,
     /// Orientation of the directors; ignored unless the material is layered.
     pub orientation: &'a Orientation,
-    /// Rates of the last iterate; zero for laws that do not depend on them.
-    pub rates: Rates,
-    /// Pressure of the last iterate, Pa; zero for laws that do not depend on it.
-    pub pressure: f64,
+    /// Flow of the last iterate; `None` if it is not known or the law does not depend on it.
+    pub flow: Option<LocalFlow>,
 }
 
 impl<'a> Here<'a> {
-    /// A state without flow.
-    pub fn at_rest(viscosity: f64, orientation: &'a Orientation) -> Self {
-        Here { viscosity, orientation, rates: Rates::default(), pressure: 0.0 }
+    /// A state whose flow is not known.
+    pub fn without_flow(viscosity: f64, orientation: &'a Orientation) -> Self {
+        Here { viscosity, orientation, flow: None }
     }
+}
+
+/// Change of the stress with the rates that is due to the change of the viscosity,
+/// `factor e (e . dr)` with `e = U r`, the stress at unit viscosity; see [`flow_curve`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Softening {
+    /// `eta'/g`, Pa s3; negative if the material softens.
+    pub factor: f64,
+    /// The stress `e` at unit viscosity, 1/s.
+    pub direction: Stress,
 }
 
 impl Law {
@@ -100,22 +122,56 @@ impl Law {
 
     /// Variables on which the law depends.
     pub fn depends_on(&self) -> Dependence {
-        match self.shear {
-            Shear::Newtonian => Dependence::default(),
-            Shear::Layered { .. } => Dependence { history: true, ..Dependence::default() },
+        Dependence {
+            history: self.is_layered(),
+            rates: self.curve.is_some(),
+            pressure: self.curve.is_some_and(|c| c.depends_on_pressure()),
         }
     }
 
-    /// The linear law at an integration point.
+    /// The linear law at an integration point: the stress divided by the rates.
     pub fn at(&self, here: &Here) -> PointLaw {
+        match (&self.curve, here.flow) {
+            (None, _) => self.of_viscosity(here.viscosity, here.orientation),
+            (Some(_), None) => self.unit(here.orientation).scaled(here.viscosity),
+            (Some(curve), Some(flow)) => {
+                let unit = self.unit(here.orientation);
+                let g = unit.power(&flow.rates).sqrt();
+                unit.scaled(curve.viscosity(g, flow.pressure).value)
+            }
+        }
+    }
+
+    /// Derivative of the stress that [`Law::at`] leaves out; `None` if there is none.
+    pub fn softening(&self, here: &Here) -> Option<Softening> {
+        let (curve, flow) = (self.curve.as_ref()?, here.flow?);
+        let unit = self.unit(here.orientation);
+        let g = unit.power(&flow.rates).sqrt();
+        let slope = curve.viscosity(g, flow.pressure).slope;
+        let direction = unit.without_excess().stress(&flow.rates, 1.0);
+        (slope != 0.0).then(|| Softening { factor: slope / g, direction })
+    }
+
+    /// Rate `g` of a generalised fluid, 1/s.
+    pub fn rate(&self, rates: &Rates, orientation: &Orientation) -> f64 {
+        self.unit(orientation).power(rates).sqrt()
+    }
+
+    /// The law of a generalised fluid at unit viscosity.
+    fn unit(&self, orientation: &Orientation) -> PointLaw {
+        self.of_viscosity(1.0, orientation)
+    }
+
+    /// The law at a shear viscosity.
+    fn of_viscosity(&self, viscosity: f64, orientation: &Orientation) -> PointLaw {
         let shear = match self.shear {
-            Shear::Newtonian => newtonian::shear(here.viscosity),
+            Shear::Newtonian => newtonian::shear(viscosity),
             Shear::Layered { layer_viscosity } => {
-                layered::shear(here.viscosity, layer_viscosity, here.orientation)
+                layered::shear(viscosity, layer_viscosity, orientation)
             }
         };
         let Cosserat { coupling, couple } = self.rotation.unwrap_or_default();
-        let dilation = if self.compliance == 0.0 { here.viscosity } else { 0.0 };
+        let dilation = if self.compliance == 0.0 { viscosity } else { 0.0 };
         PointLaw { shear, dilation, coupling, couple }
     }
 }

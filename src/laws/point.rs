@@ -75,6 +75,12 @@ impl PointLaw {
         PointLaw { shear, dilation: f * self.dilation, ..*self }
     }
 
+    /// The law with all its viscosities multiplied by `f`.
+    pub fn scaled(&self, f: f64) -> Self {
+        let [coupling, couple] = [self.coupling, self.couple].map(|v| f * v);
+        PointLaw { coupling, couple, ..self.with_viscosity_scaled(f) }
+    }
+
     /// Coupling viscosity minus the mean shear viscosity, Pa s; zero if this is negative.
     pub fn excess_coupling(&self) -> f64 {
         (self.coupling - self.shear.mean()).max(0.0)

@@ -87,6 +87,7 @@ fn same_history(a: &Matter, b: &Matter) -> bool {
             m.carries_density,
             std::mem::discriminant(&m.law.shear),
             m.law.rotation.is_some(),
+            m.law.curve.map(|c| std::mem::discriminant(&c.strength)),
             m.law.compliance > 0.0,
         )
     };

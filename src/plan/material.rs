@@ -31,6 +31,12 @@ impl Material {
         }
     }
 
+    /// Whether the law depends on the flow, and neither law nor density on what particles carry.
+    pub fn is_flowing(&self) -> bool {
+        let depends = self.law.depends_on();
+        depends.needs_flow() && !(depends.history || self.carries_viscosity || self.carries_density)
+    }
+
     /// Whether the law and the density are the same for all particles, independent of their history
     /// and of the flow.
     pub fn is_uniform(&self) -> bool {

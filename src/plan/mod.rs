@@ -24,6 +24,7 @@ pub use units::Units;
 pub use warning::Warning;
 
 use crate::scene::{ColourBy, FieldFn, FieldName, Integrator, Quadrature, Scene};
+use crate::space::constraints::PressurePoint;
 use crate::space::mesh::Mesh;
 use crate::space::seeding::Seeding;
 use crate::space::segment::Segment;
@@ -49,6 +50,9 @@ pub struct Plan {
     pub enclosure: Enclosure,
     /// Boundary conditions.
     pub boundary: BoundaryPlan,
+    /// Point at which the pressure is given, where the boundaries determine it only up to a
+    /// constant; its mean is zero if no point is given.
+    pub pressure_reference: Option<PressurePoint>,
     /// Materials and gravity at the start.
     pub state: Matter,
     /// Changes of `state` at given times or steps, in ascending order.
@@ -249,6 +253,8 @@ pub struct Method {
     pub stabilisation: Option<f64>,
     /// Tolerance of the solver for the relative residual and the relative divergence.
     pub tolerance: f64,
+    /// Tolerance of the iteration for generalised fluids.
+    pub nonlinear_tolerance: f64,
     /// Largest number of corrections (iterations) of the solver.
     pub max_corrections: u32,
 }

@@ -43,6 +43,11 @@ impl Units {
     pub fn acceleration(&self) -> f64 {
         self.force_density() / self.density
     }
+    /// Density of the inertial force `rho du/dt`, kg/m3. It is not the unit of the density, which
+    /// the weight determines.
+    pub fn inertial_density(&self) -> f64 {
+        self.stress() / self.velocity().powi(2)
+    }
     /// Couple viscosity M, Pa s m2.
     pub fn couple_viscosity(&self) -> f64 {
         self.viscosity * self.length * self.length

@@ -51,6 +51,9 @@ pub struct Scene {
     /// Solid rectangles inside the domain.
     #[serde(default)]
     pub blocks: Vec<Block>,
+    /// Pressure at a point, where the boundaries determine it only up to a constant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure_reference: Option<PressureReference>,
     /// Force and couple per volume, fixed in space, in addition to gravity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_force: Option<BodyForce>,
@@ -181,6 +184,36 @@ pub struct Material {
     /// Viscosity eta_s of shear along the layers, whose normal is the director, Pa s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layer_viscosity: Option<Quantity>,
+    /// Coupling viscosity over shear viscosity, eta_c/eta, instead of a coupling viscosity. Default
+    /// 1 for a material with friction, a yield stress or a flow index and an internal length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupling_ratio: Option<Quantity>,
+    /// Viscosity of shear along the layers over shear viscosity, eta_s/eta, for a material with
+    /// friction, a yield stress or a flow index.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layer_ratio: Option<Quantity>,
+    /// Friction of grains, tau = c + mu(I) p, instead of a viscosity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+    /// Cohesion c of grains with friction, Pa; default 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cohesion: Option<Quantity>,
+    /// Yield stress tau_y, Pa. With it or `flow_index` the material follows tau = tau_y + K g^n, and
+    /// `shear_viscosity` is the consistency K, Pa s^n (Herschel and Bulkley); default 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub yield_stress: Option<Quantity>,
+    /// Flow index n, 0.05 to 5; default 1, a Bingham fluid.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flow_index: Option<Quantity>,
+    /// Largest viscosity of a material with friction, a yield stress or a flow index, Pa s: that of
+    /// material at rest. Default: 1e4 rho sqrt(g H^3) with the height H of its regions; with a yield
+    /// stress at least 1e4 K.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_viscosity: Option<Quantity>,
+    /// Smallest viscosity of such a material, Pa s: that of grains without pressure and cohesion.
+    /// Default: the viscosity of the background, or 1e-8 of the largest without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smallest_viscosity: Option<Quantity>,
     /// Contact parameters of grains from which the viscosities are computed, instead of giving
     /// them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -192,6 +225,27 @@ pub struct Material {
     /// Colour in pictures, `#rrggbb`; default: from a palette for colour-blind readers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colour: Option<String>,
+}
+
+/// Friction of grains (Jop, Forterre and Pouliquen 2006): mu(I) = mu_s + (mu_2 - mu_s)/(1 + I_0/I)
+/// with the inertial number I = d g sqrt(rho_s/p).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Friction {
+    /// Coefficient of friction at rest, mu_s.
+    #[serde(rename = "static")]
+    pub at_rest: Quantity,
+    /// Coefficient of friction at large rates, mu_2; default: that at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dynamic: Option<Quantity>,
+    /// Inertial number I_0 at which the coefficient is halfway between the two.
+    #[serde(default = "inertial_number_default")]
+    pub inertial_number: Quantity,
+    /// Diameter d of the grains, m.
+    pub grain_diameter: Quantity,
+    /// Density rho_s of the grain material, kg/m3; default: the density of the material.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grain_density: Option<Quantity>,
 }
 
 /// Granular closure, equations (14)-(17) of Dufour, Muehlhaus and Moresi.
@@ -367,6 +421,17 @@ pub struct Block {
     /// Kind of boundary condition on its faces.
     #[serde(default)]
     pub kind: WallKind,
+}
+
+/// Pressure at a point, where the boundaries determine it only up to a constant.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressureReference {
+    /// Coordinates x and y of the point, m.
+    pub at: [Quantity; 2],
+    /// Pressure at the point, Pa.
+    #[serde(default = "zero")]
+    pub value: Quantity,
 }
 
 /// Force and couple per volume, fixed in space.
@@ -577,6 +642,9 @@ pub struct Accuracy {
     pub stabilisation: f64,
     /// Tolerance of the solver for the relative residual and the relative divergence.
     pub tolerance: f64,
+    /// Tolerance of the iteration for materials with friction, a yield stress or a flow index: the
+    /// estimated error of the flow relative to the flow, in the norm of the dissipated power.
+    pub nonlinear_tolerance: f64,
     /// Largest number of corrections (iterations) before the solver reports no convergence.
     pub max_corrections: u32,
     /// Seed of the random numbers.
@@ -708,6 +776,7 @@ impl Default for Accuracy {
             integrator: Integrator::Extrapolated,
             stabilisation: 0.75,
             tolerance: 1e-12,
+            nonlinear_tolerance: 1e-3,
             max_corrections: 40,
             seed: 1,
         }
@@ -749,6 +818,9 @@ fn courant_default() -> f64 {
 }
 fn strain_default() -> f64 {
     0.25
+}
+fn inertial_number_default() -> Quantity {
+    Quantity::number(0.279)
 }
 fn yes() -> bool {
     true

@@ -89,6 +89,11 @@ impl SimError {
             SimError::Solve { source: SolveError::Stalled { .. }, .. } => {
                 "raise accuracy.max_corrections or accuracy.tolerance, or lower the contrast"
             }
+            SimError::Solve { source: SolveError::Nonlinear { .. }, .. } => {
+                "likely cause: a step that changes the flow too much (lower time.tolerance), or a \
+                 large range of viscosities (lower largest_viscosity, raise smallest_viscosity); \
+                 or raise accuracy.nonlinear_tolerance"
+            }
             SimError::Solve { source: SolveError::Factor { .. }, .. } => {
                 "likely cause: too few integration points (accuracy.quadrature = \"particles\" \
                  with few particles per cell) or a contrast beyond 1e10; use \"mixture\""

@@ -4,6 +4,7 @@ use super::clock::Limiter;
 use super::row::{self, COLUMNS, GaugeRow, Row};
 use super::simulation::{Before, Simulation};
 use super::state::{State, StateError, flat, load_phases, save_phases, wrong_length};
+use crate::solve::last_flow::Iterate;
 use crate::space::flow::Flow;
 use crate::space::particles::Particles;
 use crate::space::population::Count;
@@ -243,8 +244,9 @@ impl<const D: usize> Simulation<D> {
         self.matter = changes.last().map_or(&plan.state, |c| &c.state).clone();
         self.quadrature.composition_mut().set_factors(factors);
         self.factors_of_points = factors.to_vec();
+        let last = Iterate { mesh, velocity: &flow.velocity, pressure: &flow.pressure };
         self.quadrature
-            .update(mesh, &particles, &self.matter.materials, version, &(&**mesh, &flow))
+            .update(mesh, &particles, &self.matter.materials, version, &last)
             .map_err(|e| StateError::Range { name: "particles.position", value: e.to_string() })?;
         self.particles = particles;
         self.flow = flow;

@@ -108,7 +108,8 @@ impl<const D: usize> Simulation<D> {
     pub fn new(plan: Arc<Plan>) -> Result<Self, SimError> {
         let clock = Instant::now();
         let mesh = plan.mesh.clone();
-        let constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
+        let mut constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
+        constraints.refer(plan.pressure_reference);
         let mut quadrature =
             Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len());
         quadrature.bind_kinks(|cell| constraints.fixed_sides(&mesh, cell));

@@ -5,12 +5,46 @@ use super::Integrator;
 use super::error::SimError;
 use super::phases::Phases;
 use super::simulation::Simulation;
-use crate::solve::report::Stopping;
+use crate::plan::material::Material;
+use crate::solve::last_flow::{Iterate, LastFlow, NoFlow};
+use crate::solve::nonlinear;
+use crate::solve::report::{SolveError, Stopping};
 use crate::solve::stokes::Loads;
 use crate::solve::terms::restoring::Ahead;
 use crate::solve::terms::weight::{Masses, add_acceleration, add_gravity};
 use crate::space::flow::Flow;
 use std::time::Instant;
+
+/// Tolerance of the flows of the softer materials from which a first flow starts.
+const ROUGH: f64 = 0.1;
+/// Factor between their largest viscosities.
+const STAGE: f64 = 10.0;
+
+/// Materials whose largest viscosities rise from a little above the nominal ones by a factor of ten
+/// each: their flows lead from that of the nominal viscosities to that of the materials. From the
+/// former alone, the iteration is slow where material is at rest.
+fn softer(materials: &[Material]) -> Vec<Vec<Material>> {
+    let mut out = Vec::new();
+    let mut factor = STAGE;
+    loop {
+        let mut softened = false;
+        let stage = materials.iter().cloned().map(|mut m| {
+            if let Some(curve) = &mut m.law.curve
+                && factor * m.viscosity < curve.largest
+            {
+                curve.largest = factor * m.viscosity;
+                softened = true;
+            }
+            m
+        });
+        let stage = stage.collect();
+        if !softened {
+            return out;
+        }
+        out.push(stage);
+        factor *= STAGE;
+    }
+}
 
 impl<const D: usize> Simulation<D> {
     /// Solves for the flow at the current particle positions. `restoring`: the time ahead for which
@@ -25,9 +59,13 @@ impl<const D: usize> Simulation<D> {
         let (step, time) = (self.step, self.si_time());
         self.factors_of_points.clear();
         self.factors_of_points.extend_from_slice(self.quadrature.composition().factors());
-        let last = (&*plan.mesh, &self.flow);
+        let Flow { velocity, pressure } = &self.flow;
+        let last = Iterate { mesh: &plan.mesh, velocity, pressure };
+        let nonlinear = self.matter.materials.iter().any(|m| m.law.depends_on().needs_flow());
+        let known = !nonlinear || velocity.as_flattened().iter().any(|&u| u != 0.0);
+        let last: &dyn LastFlow = if known { &last } else { &NoFlow };
         self.quadrature
-            .update(&plan.mesh, &self.particles, &self.matter.materials, self.version, &last)
+            .update(&plan.mesh, &self.particles, &self.matter.materials, self.version, last)
             .map_err(|mut source| {
                 source.x *= plan.units.length;
                 source.y *= plan.units.length;
@@ -40,15 +78,30 @@ impl<const D: usize> Simulation<D> {
         self.update_load();
         self.update_restoring(restoring);
         seconds.weight += phase.elapsed().as_secs_f64();
-        let stopping = Stopping {
-            tolerance: plan.method.tolerance,
-            max_corrections: plan.method.max_corrections,
-        };
+        let stopping = Stopping::of(&plan.method);
         let loads = Loads { nodal: &self.load, terms: &self.terms };
-        self.report =
-            self.stokes.solve(&self.quadrature, loads, stopping, &mut self.flow).map_err(
-                |source| SimError::Solve { step, time, source: source.scaled(plan.units.length) },
-            )?;
+        let Simulation { stokes, quadrature, particles, matter, flow, .. } = self;
+        let failed =
+            |s: SolveError| SimError::Solve { step, time, source: s.scaled(plan.units.length) };
+        if !known || !nonlinear {
+            self.report = stokes.solve(quadrature, loads, stopping, flow).map_err(failed)?;
+        }
+        if nonlinear {
+            let mut solve = |materials: &[Material], stopping| {
+                let matter = nonlinear::Matter { particles, materials };
+                stokes.solve_nonlinear(quadrature, matter, loads, stopping, flow)
+            };
+            let (mut iterations, mut corrections) = (0, 0);
+            for materials in if known { vec![] } else { softer(&matter.materials) } {
+                let rough = Stopping { nonlinear: ROUGH, ..stopping };
+                let report = solve(&materials, rough).map_err(failed)?;
+                iterations += report.iterations;
+                corrections += report.corrections;
+            }
+            self.report = solve(&matter.materials, stopping).map_err(failed)?;
+            self.report.iterations += iterations;
+            self.report.corrections += corrections;
+        }
         seconds.assemble += self.report.seconds.assemble;
         seconds.factor += self.report.seconds.factor;
         seconds.solve += self.report.seconds.solve;

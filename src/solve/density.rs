@@ -107,7 +107,9 @@ impl Density {
         for cell in 0..mesh.cells() {
             let kept = self.of_sides[cell].take();
             self.at_gauss[cell] = match quadrature.content(cell) {
-                Content::Uniform { material, .. } => [materials[material as usize].density; 9],
+                Content::Uniform { material, .. } | Content::Flowing { material } => {
+                    [materials[material as usize].density; 9]
+                }
                 Content::Mixed => {
                     self.gather(mesh, cell, particles, materials);
                     self.help(mesh, cell, particles, materials);

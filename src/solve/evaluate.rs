@@ -1,9 +1,10 @@
 //! This module evaluates the laws of the materials at the integration points of a cell, with
 //! mixtures and laminates, from the [`composition`](crate::composition) of the cell.
 
-use super::element::{PointShape, rates};
+use super::cells::CellMut;
 use super::laminate::{self, Cut};
-use super::points::{CutStiffness, IntegrationPoint};
+use super::last_flow::LastFlow;
+use super::points::{CutStiffness, IntegrationPoint, Place};
 use super::sides::{self, Sides};
 use crate::composition::interface::Interface;
 use crate::composition::straight::StraightCut;
@@ -12,38 +13,19 @@ use crate::laws::Here;
 use crate::laws::director::Orientation;
 use crate::laws::mixture::Mixture;
 use crate::laws::point::PointLaw;
-use crate::laws::rates::Rates;
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
-use crate::space::flow::Flow;
 use crate::space::kink::Ramp;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
-use crate::space::shape::{GAUSS_6X6, SUBPOINTS, Shape};
-use crate::threads::Divisible;
+use crate::space::shape::{GAUSS_6X6, SUBPOINTS};
 
 /// Relative difference up to which densities are equal.
 const SAME_DENSITY: f64 = 1e-12;
 
-/// Rates and pressure of the last iterate, for laws that depend on them.
-pub trait LastFlow: Sync {
-    /// Rates and pressure at the reference coordinates `r` of a cell, in the plan's units.
-    fn at(&self, cell: usize, r: [f64; 2]) -> (Rates, f64);
-}
-
-impl<const D: usize> LastFlow for (&Mesh, &Flow<D>) {
-    fn at(&self, cell: usize, r: [f64; 2]) -> (Rates, f64) {
-        let (mesh, flow) = *self;
-        let shape = PointShape::new(&Shape::at(r), mesh.cell_size(cell));
-        let pressure = mesh.measure().pressure_basis(r);
-        let p = flow.pressure[cell].iter().zip(pressure).map(|(p, q)| p * q).sum();
-        (rates(&shape, &flow.of_cell(mesh, cell)), p)
-    }
-}
-
 /// Law of a material whose particles are all alike.
 pub fn uniform(m: &Material) -> PointLaw {
-    m.law.at(&Here::at_rest(m.viscosity, &Orientation::default()))
+    m.law.at(&Here::without_flow(m.viscosity, &Orientation::default()))
 }
 
 /// Inputs of the evaluation of cells.
@@ -69,64 +51,6 @@ pub struct Evaluation<'a> {
     pub flow: &'a dyn LastFlow,
 }
 
-/// Mutable data of consecutive cells.
-pub struct CellsMut<'a> {
-    /// Number of materials.
-    pub materials: usize,
-    /// Integration points, nine per cell.
-    pub points: &'a mut [IntegrationPoint],
-    /// Stiffness of each cut cell.
-    pub cut: &'a mut [Option<Box<CutStiffness>>],
-    /// Mean viscosity of each cell.
-    pub mean_viscosity: &'a mut [f64],
-    /// Mean inverse bulk viscosity of each cell.
-    pub compliance: &'a mut [f64],
-    /// Volume fractions, by cell and material.
-    pub fractions: &'a mut [f64],
-}
-
-/// Mutable data of one cell.
-pub struct CellMut<'a> {
-    points: &'a mut [IntegrationPoint],
-    cut: &'a mut Option<Box<CutStiffness>>,
-    mean_viscosity: &'a mut f64,
-    compliance: &'a mut f64,
-    fractions: &'a mut [f64],
-}
-
-impl Divisible for CellsMut<'_> {
-    fn cut(self, at: usize) -> (Self, Self) {
-        let materials = self.materials;
-        let (p0, p1) = self.points.split_at_mut(9 * at);
-        let (k0, k1) = self.cut.split_at_mut(at);
-        let (v0, v1) = self.mean_viscosity.split_at_mut(at);
-        let (c0, c1) = self.compliance.split_at_mut(at);
-        let (f0, f1) = self.fractions.split_at_mut(materials * at);
-        let part = |points, cut, mean_viscosity, compliance, fractions| CellsMut {
-            materials,
-            points,
-            cut,
-            mean_viscosity,
-            compliance,
-            fractions,
-        };
-        (part(p0, k0, v0, c0, f0), part(p1, k1, v1, c1, f1))
-    }
-}
-
-impl CellsMut<'_> {
-    /// Data of the `k`th of these cells.
-    pub fn cell(&mut self, k: usize) -> CellMut<'_> {
-        CellMut {
-            points: &mut self.points[9 * k..9 * k + 9],
-            cut: &mut self.cut[k],
-            mean_viscosity: &mut self.mean_viscosity[k],
-            compliance: &mut self.compliance[k],
-            fractions: &mut self.fractions[k * self.materials..][..self.materials],
-        }
-    }
-}
-
 /// Arrangement of the materials of a cell.
 enum Form {
     /// Two materials separated by an interface.
@@ -145,6 +69,9 @@ impl Evaluation<'_> {
     /// Evaluates a cell.
     pub fn evaluate(&self, cell: usize, mut out: CellMut, scratch: &mut Gathered) {
         let kept = out.cut.take();
+        if let Some(list) = &mut out.softening {
+            list.clear();
+        }
         match self.content[cell] {
             Content::Uniform { material, .. } => {
                 let m = &self.materials[material as usize];
@@ -155,8 +82,27 @@ impl Evaluation<'_> {
                 let law = uniform(m);
                 out.points.iter_mut().for_each(|p| p.law = law);
             }
+            Content::Flowing { material } => self.flow(cell, usize::from(material), &mut out),
             Content::Mixed => self.mix(cell, &mut out, kept, scratch),
             Content::Solid | Content::Unknown => {}
+        }
+    }
+
+    /// Evaluates a cell of one material whose law depends on the flow only.
+    fn flow(&self, cell: usize, m: usize, out: &mut CellMut) {
+        let material = &self.materials[m];
+        out.fractions.fill(0.0);
+        out.fractions[m] = 1.0;
+        *out.compliance = material.law.compliance;
+        *out.mean_viscosity = 0.0;
+        let orientation = Orientation::default();
+        for g in 0..9 {
+            let (r, weight) = (out.points[g].r, out.points[g].weight);
+            let here = self.here((cell, r), m, material.viscosity, &orientation);
+            let law = material.law.at(&here);
+            out.points[g].law = law;
+            *out.mean_viscosity += weight * law.shear.mean();
+            out.soften(Place::Gauss(g as u8), weight, material, &here);
         }
     }
 
@@ -180,7 +126,14 @@ impl Evaluation<'_> {
             Form::Cut { .. } | Form::Mixture => Mixture::default(),
         };
         scratch.match_volumes(self.factors);
-        self.points(cell, out, scratch, mixture);
+        // Where the stress is not the sum of those of the materials, its derivative is left out.
+        let softened = match &form {
+            Form::Sides { cut, .. } => 1.0 - cut.trust,
+            Form::Weights => 1.0,
+            Form::Mixture if scratch.volumes().iter().filter(|&&v| v > 0.0).count() == 1 => 1.0,
+            Form::Cut { .. } | Form::Drops { .. } | Form::Mixture => 0.0,
+        };
+        self.points(cell, out, scratch, (mixture, softened));
         let cut = match form {
             Form::Cut { interface, between } => {
                 let cut = self.laminate(cell, &interface, between, scratch);
@@ -192,7 +145,7 @@ impl Evaluation<'_> {
                     cut.rest * *out.mean_viscosity + (1.0 - cut.rest) * arithmetic;
                 cut
             }
-            Form::Sides { cut, between } => self.sides(cell, cut, between, scratch),
+            Form::Sides { cut, between } => self.sides(cell, cut, between, (scratch, out)),
             Form::Weights | Form::Drops { .. } | Form::Mixture => return,
         };
         *out.cut = Some(match kept {
@@ -259,20 +212,30 @@ impl Evaluation<'_> {
         StraightCut::new(centroids.share(b), centroids.centroid(b))
     }
 
-    /// Law of a material at a point of a cell.
-    fn law(
+    /// State of a material at a point of a cell.
+    fn here<'o>(
         &self,
         (cell, r): (usize, [f64; 2]),
         m: usize,
         viscosity: f64,
+        orientation: &'o Orientation,
+    ) -> Here<'o> {
+        let mut here = Here::without_flow(viscosity, orientation);
+        if self.materials[m].law.depends_on().needs_flow() {
+            here.flow = self.flow.at(cell, r);
+        }
+        here
+    }
+
+    /// Law of a material at a point of a cell.
+    fn law(
+        &self,
+        point: (usize, [f64; 2]),
+        m: usize,
+        viscosity: f64,
         orientation: &Orientation,
     ) -> PointLaw {
-        let law = &self.materials[m].law;
-        let mut here = Here::at_rest(viscosity, orientation);
-        if law.depends_on().needs_flow() {
-            (here.rates, here.pressure) = self.flow.at(cell, r);
-        }
-        law.at(&here)
+        self.materials[m].law.at(&self.here(point, m, viscosity, orientation))
     }
 
     /// Carried or constant viscosity of a material at a point of a gathered cell.
@@ -296,17 +259,37 @@ impl Evaluation<'_> {
     }
 
     /// Stiffness of a cell of two materials on the two sides of a line. Each material has its law
-    /// at the centre of the cell.
+    /// at the centre of the cell, or at the points of [`GAUSS_6X6`] if it depends on the flow. The
+    /// velocity then has no kink.
     fn sides(
         &self,
         cell: usize,
         cut: StraightCut,
         between: [usize; 2],
-        scratch: &Gathered,
+        (scratch, out): (&Gathered, &mut CellMut),
     ) -> CutStiffness {
-        let laws = between.map(|m| self.law_at_centre(cell, m, scratch));
-        let (mut matrix, kinked) =
-            sides::matrix(&cut, &laws, self.mesh.cell_measure(cell), self.ramps[cell]);
+        let measure = self.mesh.cell_measure(cell);
+        let flows = |m: usize| self.materials[m].law.depends_on().needs_flow();
+        let (mut matrix, kinked) = if between.into_iter().any(flows) {
+            let laws = std::array::from_fn(|q| {
+                let g = &GAUSS_6X6[q];
+                let shares = [1.0 - cut.share[q], cut.share[q]];
+                [0, 1].map(|side| {
+                    let (m, share) = (between[side], shares[side]);
+                    let eta = self.viscosity(m, g.r, scratch);
+                    let here = self.here((cell, g.r), m, eta, scratch.cell_orientation(m));
+                    if flows(m) && share > 0.0 {
+                        let weight = g.weight * share * cut.trust;
+                        out.soften_shear(Place::Fine(q as u8), weight, &self.materials[m], &here);
+                    }
+                    self.materials[m].law.at(&here)
+                })
+            });
+            (sides::varying(&cut, &laws, measure), None)
+        } else {
+            let laws = between.map(|m| self.law_at_centre(cell, m, scratch));
+            sides::matrix(&cut, &laws, measure, self.ramps[cell])
+        };
         matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);
         CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kinked }) }
     }
@@ -336,25 +319,37 @@ impl Evaluation<'_> {
         })
     }
 
-    /// Fills the nine points of a cell, its volume fractions and its means.
-    fn points(&self, cell: usize, out: &mut CellMut, scratch: &Gathered, empty: Mixture) {
+    /// Fills the nine points of a cell, its volume fractions and its means. `softened`: the part of
+    /// the derivatives of the viscosities that the points have.
+    fn points(
+        &self,
+        cell: usize,
+        out: &mut CellMut,
+        scratch: &Gathered,
+        (empty, softened): (Mixture, f64),
+    ) {
         out.fractions.fill(0.0);
         (*out.mean_viscosity, *out.compliance) = (0.0, 0.0);
-        for (g, point) in out.points.iter_mut().enumerate() {
+        for g in 0..9 {
+            let IntegrationPoint { r, weight, .. } = out.points[g];
             let mut mixture = empty;
             for (m, material) in self.materials.iter().enumerate() {
                 let phi = scratch.share(m, g);
                 if phi == 0.0 {
                     continue;
                 }
-                let eta = self.viscosity(m, point.r, scratch);
-                let law = self.law((cell, point.r), m, eta, scratch.orientation(m, g));
-                mixture.add(phi, &law);
-                out.fractions[m] += point.weight * phi;
-                *out.compliance += point.weight * phi * material.law.compliance;
+                let eta = self.viscosity(m, r, scratch);
+                let here = self.here((cell, r), m, eta, scratch.orientation(m, g));
+                mixture.add(phi, &material.law.at(&here));
+                out.fractions[m] += weight * phi;
+                *out.compliance += weight * phi * material.law.compliance;
+                if softened > 0.0 {
+                    out.soften(Place::Gauss(g as u8), weight * phi * softened, material, &here);
+                }
             }
-            point.law = mixture.law();
-            *out.mean_viscosity += point.weight * point.law.shear.mean();
+            let law = mixture.law();
+            out.points[g].law = law;
+            *out.mean_viscosity += weight * law.shear.mean();
         }
     }
 }
@@ -385,9 +380,9 @@ pub fn particle_point(
     let director = particles.director.as_ref().filter(|_| m.law.is_layered()).map(|d| d[p]);
     let orientation = director.map_or(Orientation::default(), Orientation::of);
     let r = mesh.to_reference(cell, particles.position[p]);
-    let mut here = Here::at_rest(eta, &orientation);
+    let mut here = Here::without_flow(eta, &orientation);
     if m.law.depends_on().needs_flow() {
-        (here.rates, here.pressure) = flow.at(cell, r);
+        here.flow = flow.at(cell, r);
     }
     let weight = particles.volume[p] / total;
     (eta, IntegrationPoint { law: m.law.at(&here), density, weight, r })

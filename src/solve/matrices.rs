@@ -101,7 +101,7 @@ impl<const D: usize> Matrices<D> {
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
-            let known = content != Content::Mixed && content == *built_from;
+            let known = content.is_constant() && content == *built_from;
             if content != Content::Solid && !known {
                 let blocks = Self::NO_BLOCKS;
                 let matrix = CellMatrix::ZERO;
@@ -156,6 +156,9 @@ impl<const D: usize> Fresh<D> {
         });
         if let Some(cut) = cut {
             add_cut_stiffness(&mut k, cut);
+        }
+        for softening in quadrature.softening(cell) {
+            softening.add_stiffness::<D>(&mut k, measure);
         }
         // Reuse the memory of the previous modes.
         let before = self.rotation.take();

@@ -1,13 +1,16 @@
 //! This module solves for velocity, rotation and pressure. It holds the integration points, the
 //! terms of the equations, the element matrices, the sparse factor and the corrections.
 
+pub mod cells;
 mod correction;
 pub mod density;
 pub mod element;
 pub mod evaluate;
 pub mod laminate;
+pub mod last_flow;
 pub mod matrices;
 pub mod multifrontal;
+pub mod nonlinear;
 pub mod points;
 mod problem;
 pub mod quadrature;

@@ -21,8 +21,10 @@
 //! **Particles**. Each particle is an integration point with its own law and a weight proportional
 //! to its volume: the method of the source paper, for comparison.
 
-use super::evaluate::{CellsMut, Evaluation, LastFlow};
-use super::points::{CutStiffness, IntegrationPoint};
+use super::cells::CellsMut;
+use super::evaluate::Evaluation;
+use super::last_flow::LastFlow;
+use super::points::{CutStiffness, IntegrationPoint, SofteningPoint};
 use super::sides::Kinked;
 use crate::composition::{Composition, Content, EmptyCell, Kind, SCRATCH};
 use crate::laws::point::PointLaw;
@@ -55,6 +57,10 @@ pub struct Quadrature {
     pub mean_viscosity: Vec<f64>,
     /// Mean inverse bulk viscosity 1/B of each cell.
     pub compliance: Vec<f64>,
+    /// Derivatives of the viscosities of generalised fluids, by cell; empty if there are none.
+    softening: Vec<Vec<SofteningPoint>>,
+    /// Volume factors of the materials in the last update.
+    factors: Vec<f64>,
 }
 
 impl Quadrature {
@@ -82,6 +88,8 @@ impl Quadrature {
             cut: vec![None; cells],
             mean_viscosity: vec![0.0; cells],
             compliance: vec![0.0; cells],
+            softening: vec![],
+            factors: vec![],
         }
     }
 
@@ -145,6 +153,11 @@ impl Quadrature {
         self.cut[cell].as_deref()
     }
 
+    /// Derivatives of the viscosities at the points of a cell.
+    pub fn softening(&self, cell: usize) -> &[SofteningPoint] {
+        self.softening.get(cell).map_or(&[], |list| list)
+    }
+
     /// Kink of the velocity in a cell, if it has one.
     pub fn kinked(&self, cell: usize) -> Option<&Kinked> {
         self.cut(cell)?.kinked()
@@ -194,6 +207,7 @@ impl Quadrature {
         self.kinds.clear();
         self.kinds.extend(materials.iter().map(|m| Kind {
             uniform: m.is_uniform(),
+            flowing: m.is_flowing(),
             directors: m.law.is_layered(),
             viscosity: m.carries_viscosity,
         }));
@@ -209,6 +223,52 @@ impl Quadrature {
             }
             return Ok(());
         }
+        if materials.iter().any(|m| m.law.depends_on().needs_flow()) {
+            self.softening.resize_with(mesh.cells(), Vec::new);
+        }
+        self.factors.clear();
+        self.factors.extend_from_slice(self.composition.factors());
+        self.evaluate(mesh, particles, materials, flow, |c, cell| c.is_fresh(cell));
+        self.composition.keep_volumes(mesh, particles);
+        Ok(())
+    }
+
+    /// Evaluates the cells with laws that depend on the flow again, with another iterate and
+    /// otherwise the arguments of the last [`Quadrature::update`].
+    pub fn reevaluate(
+        &mut self,
+        mesh: &Mesh,
+        particles: &Particles,
+        materials: &[Material],
+        flow: &dyn LastFlow,
+    ) {
+        if self.rule == Rule::Particles {
+            self.points.clear();
+            for cell in 0..mesh.cells() {
+                self.list(mesh, cell, particles, materials, flow);
+            }
+            return;
+        }
+        let flows: Vec<usize> =
+            (0..materials.len()).filter(|&m| materials[m].law.depends_on().needs_flow()).collect();
+        self.evaluate(mesh, particles, materials, flow, |composition, cell| {
+            match composition.content(cell) {
+                Content::Flowing { .. } => true,
+                Content::Mixed => flows.iter().any(|&m| composition.fraction(cell, m) > 0.0),
+                Content::Uniform { .. } | Content::Solid | Content::Unknown => false,
+            }
+        });
+    }
+
+    /// Evaluates some of the cells.
+    fn evaluate(
+        &mut self,
+        mesh: &Mesh,
+        particles: &Particles,
+        materials: &[Material],
+        flow: &dyn LastFlow,
+        selected: impl Fn(&Composition, usize) -> bool + Sync,
+    ) {
         let Quadrature {
             rule,
             composition,
@@ -218,8 +278,11 @@ impl Quadrature {
             cut,
             mean_viscosity,
             compliance,
+            softening,
+            factors,
             ..
         } = self;
+        let chosen: Vec<bool> = (0..mesh.cells()).map(|cell| selected(composition, cell)).collect();
         // The volume fractions are written while the rest of the composition is read.
         let mut fractions = std::mem::take(&mut composition.fractions);
         let from = Evaluation {
@@ -229,7 +292,7 @@ impl Quadrature {
             materials,
             kinds,
             content: composition.contents(),
-            factors: composition.factors(),
+            factors,
             ramps,
             flow,
         };
@@ -240,19 +303,17 @@ impl Quadrature {
             mean_viscosity,
             compliance,
             fractions: &mut fractions,
+            softening,
         };
-        let composition_read = &*composition;
         threads::for_parts(cells, 0..mesh.cells(), GRAIN, |range, mut cells| {
             SCRATCH.with_borrow_mut(|scratch| {
                 scratch.prepare(materials.len());
-                for (k, cell) in range.enumerate().filter(|&(_, c)| composition_read.is_fresh(c)) {
+                for (k, cell) in range.enumerate().filter(|&(_, c)| chosen[c]) {
                     from.evaluate(cell, cells.cell(k), scratch);
                 }
             });
         });
         composition.fractions = fractions;
-        composition.keep_volumes(mesh, particles);
-        Ok(())
     }
 
     /// Fills the points of a cell whose particles are the integration points.

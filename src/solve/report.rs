@@ -1,6 +1,7 @@
 //! This module defines the report of a solution, the stopping criteria and the errors.
 
 use super::multifrontal::NotPositiveDefinite;
+use crate::plan::Method;
 
 /// Powers below this fraction of [`Report::power_scale`] are rounding errors of a scene at rest.
 const REST: f64 = 1e-6;
@@ -10,8 +11,21 @@ const REST: f64 = 1e-6;
 pub struct Stopping {
     /// Tolerance on the scaled residual and on the relative divergence.
     pub tolerance: f64,
+    /// Tolerance of the iteration for generalised fluids; see [`Report::decrement`].
+    pub nonlinear: f64,
     /// Largest number of corrections.
     pub max_corrections: u32,
+}
+
+impl Stopping {
+    /// The criteria of a plan.
+    pub fn of(method: &Method) -> Self {
+        Stopping {
+            tolerance: method.tolerance,
+            nonlinear: method.nonlinear_tolerance,
+            max_corrections: method.max_corrections,
+        }
+    }
 }
 
 /// Report of a solution; powers are in the plan's units.
@@ -19,6 +33,11 @@ pub struct Stopping {
 pub struct Report {
     /// Number of corrections.
     pub corrections: u32,
+    /// Number of iterations for generalised fluids; zero for linear laws.
+    pub iterations: u32,
+    /// Relative Newton decrement of the last iteration, an estimate of the relative error before
+    /// it; see [`nonlinear`](super::nonlinear). `None` for linear laws.
+    pub decrement: Option<f64>,
     /// Scaled residual `||r||_{1/D} / (||f||_{1/D} + ||sqrt(D) u||)`, `D = diag K`, with a small
     /// share of the forces of the pressure added to the denominator.
     pub residual: f64,
@@ -95,6 +114,21 @@ pub enum SolveError {
         /// Coordinate y of the largest error.
         y: f64,
     },
+    /// The iteration for generalised fluids did not converge.
+    #[error(
+        "no convergence in {iterations} iterations of the flow curves: relative error about \
+         {decrement:.1e}; the largest residual is at ({x:.4e}, {y:.4e})"
+    )]
+    Nonlinear {
+        /// Number of iterations.
+        iterations: u32,
+        /// Estimated relative error; see [`Report::decrement`].
+        decrement: f64,
+        /// Coordinate x of the largest residual.
+        x: f64,
+        /// Coordinate y of the largest residual.
+        y: f64,
+    },
     /// The residual is infinite or not a number.
     #[error("the solution is not finite after {corrections} corrections")]
     NonFinite {
@@ -107,7 +141,9 @@ impl SolveError {
     /// The error with its coordinates multiplied by `length`.
     pub fn scaled(mut self, length: f64) -> Self {
         match &mut self {
-            SolveError::Factor { x, y, .. } | SolveError::Stalled { x, y, .. } => {
+            SolveError::Factor { x, y, .. }
+            | SolveError::Stalled { x, y, .. }
+            | SolveError::Nonlinear { x, y, .. } => {
                 *x *= length;
                 *y *= length;
             }

@@ -38,7 +38,7 @@ use crate::laws::point::{PointLaw, Sym2};
 use crate::laws::rates::Rates;
 use crate::space::kink::{Kink, Ramp};
 use crate::space::measure::CellMeasure;
-use crate::space::shape::{GAUSS_6X6, GaussPoint, NODES};
+use crate::space::shape::{GAUSS_6X6, GaussPoint, NODES, SUBPOINTS};
 
 /// Logarithm to base 10 of the contrast up to which the velocity has its full kink.
 const KINKED: f64 = 5.0;
@@ -159,8 +159,36 @@ pub fn matrix(
     cell: CellMeasure,
     ramp: Option<Ramp>,
 ) -> (VelocityMatrix, Option<Kinked>) {
+    let mut k = integrated(cut, |_| laws, cell);
+    let kinked = ramp.and_then(|ramp| {
+        let mut kinked = Kinked::new(cut.line, ramp, cell);
+        kinked.eliminate(cut, laws, cell, &mut k).then_some(kinked)
+    });
+    symmetrize(&mut k);
+    (k, kinked)
+}
+
+/// Stiffness matrix of a cell whose materials have given laws at the points of [`GAUSS_6X6`]; the
+/// velocity has no kink.
+pub fn varying(
+    cut: &StraightCut,
+    laws: &[[PointLaw; 2]; SUBPOINTS],
+    cell: CellMeasure,
+) -> VelocityMatrix {
+    let mut k = integrated(cut, |q| &laws[q], cell);
+    symmetrize(&mut k);
+    k
+}
+
+/// Integral over both sides with the laws of the two materials at each point.
+fn integrated<'a>(
+    cut: &StraightCut,
+    laws: impl Fn(usize) -> &'a [PointLaw; 2],
+    cell: CellMeasure,
+) -> VelocityMatrix {
     let mut k: VelocityMatrix = [[0.0; 2 * NODES]; 2 * NODES];
-    for (g, &share) in GAUSS_6X6.iter().zip(&cut.share) {
+    for (q, (g, &share)) in GAUSS_6X6.iter().zip(&cut.share).enumerate() {
+        let laws = laws(q);
         let mut mixture = Mixture::parallel();
         mixture.add(1.0 - share, &laws[0]);
         mixture.add(share, &laws[1]);
@@ -172,17 +200,16 @@ pub fn matrix(
             add_forces(row, &s, &law, &Rates::classical(gradient), cell.of_point(g.weight));
         }
     }
-    let kinked = ramp.and_then(|ramp| {
-        let mut kinked = Kinked::new(cut.line, ramp, cell);
-        kinked.eliminate(cut, laws, cell, &mut k).then_some(kinked)
-    });
-    // Rounding differs between the two halves.
+    k
+}
+
+/// Copies the lower triangle to the upper one: rounding differs between the two.
+fn symmetrize(k: &mut VelocityMatrix) {
     for i in 0..2 * NODES {
         for j in 0..i {
             k[j][i] = k[i][j];
         }
     }
-    (k, kinked)
 }
 
 #[cfg(test)]
@@ -198,7 +225,7 @@ mod tests {
     const SIZE: [f64; 2] = [0.7, 1.3];
 
     fn law(viscosity: f64) -> PointLaw {
-        Law::default().at(&Here::at_rest(viscosity, &Orientation::default()))
+        Law::default().at(&Here::without_flow(viscosity, &Orientation::default()))
     }
 
     fn cut(seed: i32) -> StraightCut {

@@ -157,7 +157,7 @@ impl<const D: usize> Stokes<D> {
 
     /// Computes the element matrices of the cells that changed; returns the number of active
     /// rotation unknowns.
-    fn assemble(&mut self, quadrature: &Quadrature, terms: &Terms) -> usize {
+    pub(super) fn assemble(&mut self, quadrature: &Quadrature, terms: &Terms) -> usize {
         let Stokes {
             mesh,
             incidence,
@@ -179,11 +179,21 @@ impl<const D: usize> Stokes<D> {
     }
 
     /// The error of a failed factorisation, with the position and the name of the unknown.
-    fn explain(&self, source: NotPositiveDefinite) -> SolveError {
+    pub(super) fn explain(&self, source: NotPositiveDefinite) -> SolveError {
         let node = self.factor.tree().node[source.unknown / D] as usize;
         let [x, y] = self.mesh.node_position(node);
         let component = ["u", "v", "w"][source.unknown % D];
         SolveError::Factor { source, x, y, component }
+    }
+
+    /// Position of the largest residual, relative to the diagonal of the matrix.
+    pub(super) fn largest_residual(&self, r: &Residual<D>) -> [f64; 2] {
+        let worst = (0..self.mesh.nodes())
+            .flat_map(|n| (0..D).map(move |c| (n, c)))
+            .filter(|&(n, c)| !self.constraints.is_fixed(n, c) && self.diagonal[n][c] > 0.0)
+            .map(|(n, c)| (n, r.force[n][c].powi(2) / self.diagonal[n][c]))
+            .fold((0, 0.0), |a: (usize, f64), b| if b.1 > a.1 { b } else { a });
+        self.mesh.node_position(worst.0)
     }
 
     /// The error of a solution that did not converge, with the position of the largest residual, or
@@ -191,12 +201,7 @@ impl<const D: usize> Stokes<D> {
     fn stalled(&self, r: &Residual<D>, report: &Report, tolerance: f64) -> SolveError {
         let largest = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
         let [x, y] = if report.residual > tolerance {
-            let worst = (0..self.mesh.nodes())
-                .flat_map(|n| (0..D).map(move |c| (n, c)))
-                .filter(|&(n, c)| !self.constraints.is_fixed(n, c) && self.diagonal[n][c] > 0.0)
-                .map(|(n, c)| (n, r.force[n][c].powi(2) / self.diagonal[n][c]))
-                .fold((0, 0.0), largest);
-            self.mesh.node_position(worst.0)
+            self.largest_residual(r)
         } else {
             let density = |cell: usize| {
                 let sum: f64 = r.divergence[cell].iter().map(|d| d * d).sum();

@@ -14,6 +14,18 @@ pub struct Constraints<const D: usize> {
     free_translation: [bool; 2],
     /// Whether no boundary lets fluid out, so that the pressure is determined up to a constant.
     closed: bool,
+    /// Point at which the pressure is given if it is determined only up to a constant; its mean is
+    /// zero if no point is given.
+    reference: Option<PressurePoint>,
+}
+
+/// A given pressure at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PressurePoint {
+    /// The point, in the plan's units.
+    pub at: [f64; 2],
+    /// Pressure, in the plan's units.
+    pub value: f64,
 }
 
 impl<const D: usize> Constraints<D> {
@@ -24,6 +36,7 @@ impl<const D: usize> Constraints<D> {
             value: vec![[0.0; D]; mesh.nodes()],
             free_translation: [false; 2],
             closed: false,
+            reference: None,
         }
     }
 
@@ -63,6 +76,11 @@ impl<const D: usize> Constraints<D> {
         self.closed = true;
     }
 
+    /// Gives the pressure at a point, if it is determined only up to a constant.
+    pub fn refer(&mut self, reference: Option<PressurePoint>) {
+        self.reference = reference;
+    }
+
     /// Sets the prescribed components to their values.
     pub fn impose(&self, velocity: &mut [[f64; D]]) {
         for ((u, fixed), value) in velocity.iter_mut().zip(&self.fixed).zip(&self.value) {
@@ -74,8 +92,8 @@ impl<const D: usize> Constraints<D> {
         }
     }
 
-    /// Subtracts the mean velocity along free translations, and the mean pressure if it is
-    /// determined only up to a constant.
+    /// Subtracts the mean velocity along free translations, and determines the constant of the
+    /// pressure if there is one.
     pub fn remove_null_space(&self, mesh: &Mesh, flow: &mut Flow<D>) {
         let cells = || (0..mesh.cells()).filter(|&c| !mesh.solid[c]);
         let area: f64 = cells().map(|c| mesh.cell_volume(c)).sum();
@@ -91,7 +109,10 @@ impl<const D: usize> Constraints<D> {
             }
             flow.velocity.iter_mut().for_each(|u| u[c] -= mean);
         }
-        if self.closed {
+        if let (true, Some(PressurePoint { at, value })) = (self.closed, self.reference) {
+            let shift = value - flow.pressure_at(mesh, at);
+            cells().for_each(|c| flow.pressure[c][0] += shift);
+        } else if self.closed {
             let mean: f64 =
                 cells().map(|c| flow.pressure[c][0] * mesh.cell_volume(c)).sum::<f64>() / area;
             cells().for_each(|c| flow.pressure[c][0] -= mean);

@@ -3,10 +3,11 @@
 
 use grainscope::laws::cosserat::Cosserat;
 use grainscope::laws::director::{self, Orientation};
+use grainscope::laws::flow_curve::{FlowCurve, Friction, Strength};
 use grainscope::laws::mixture::Mixture;
 use grainscope::laws::point::{PointLaw, Sym2};
 use grainscope::laws::rates::{Rates, Stress};
-use grainscope::laws::{Here, Law, Shear, granular};
+use grainscope::laws::{Here, Law, LocalFlow, Shear, granular};
 use nalgebra::{Matrix2, Matrix6, Rotation2, Vector2, Vector6};
 
 const ETA: f64 = 1000.0;
@@ -27,7 +28,7 @@ fn laws() -> Vec<Law> {
     ] {
         for rotation in [None, Some(Cosserat { coupling: 300.0, couple: 12.0 })] {
             for compliance in [0.0, 1e-4] {
-                list.push(Law { shear, rotation, compliance });
+                list.push(Law { shear, rotation, compliance, curve: None });
             }
         }
     }
@@ -37,7 +38,7 @@ fn laws() -> Vec<Law> {
 /// The law of a material whose layers have their normal at an angle.
 fn at(law: &Law, angle: f64) -> PointLaw {
     let orientation = Orientation::of([angle.cos(), angle.sin()]);
-    law.at(&Here::at_rest(ETA, &orientation))
+    law.at(&Here::without_flow(ETA, &orientation))
 }
 
 fn rates(l: &Matrix2<f64>, w: f64, kappa: Vector2<f64>) -> Rates {
@@ -139,6 +140,7 @@ fn stresses_are_those_of_the_source() {
             shear: Shear::Layered { layer_viscosity: eta_s },
             rotation: Some(Cosserat { coupling, couple }),
             compliance: 0.0,
+            curve: None,
         };
         let (stress, couples) = tensors(&at(&law, angle).stress(&rates(&l, w, kappa), 1.0));
         assert!((stress - expected).norm() < 1e-9 * ETA, "{angle}: {stress} {expected}");
@@ -178,8 +180,9 @@ fn laws_depend_on_nothing_that_they_do_not_declare() {
     let orientation = Orientation::of([0.6, 0.8]);
     for law in laws() {
         let declared = law.depends_on();
-        let rest = Here::at_rest(ETA, &orientation);
-        let here = Here { rates: rates_of(&Vector6::from(SOME)), pressure: 7.0, ..rest };
+        let rest = Here::without_flow(ETA, &orientation);
+        let flow = LocalFlow { rates: rates_of(&Vector6::from(SOME)), pressure: 7.0 };
+        let here = Here { flow: Some(flow), ..rest };
         assert!(declared.needs_flow() || law.at(&here) == law.at(&rest));
         let other = Orientation::of([0.8, -0.6]);
         let turned = Here { orientation: &other, ..rest };
@@ -264,4 +267,114 @@ fn mixtures_are_exact_for_one_law_and_between_the_bounds_for_two() {
             assert!((s.a / harmonic - 1.0).abs() < 1e-9, "{} {harmonic}", s.a);
         }
     }
+}
+
+/// Laws with a flow curve: isotropic, Cosserat and layered, with a yield stress and with friction.
+fn generalised() -> Vec<Law> {
+    let friction = Friction {
+        at_rest: 0.38,
+        fast: 0.64,
+        inertial_number: 0.279,
+        diameter: 0.04,
+        grain_density: 1.7,
+        cohesion: 0.1,
+    };
+    let mud = Strength::HerschelBulkley { yield_stress: 2.0, consistency: 3.0, index: 0.6 };
+    let rotation = Some(Cosserat { coupling: 0.7, couple: 0.3 });
+    let mut list = Vec::new();
+    for strength in [mud, Strength::Friction(friction)] {
+        for shear in [Shear::Newtonian, Shear::Layered { layer_viscosity: 0.2 }] {
+            for rotation in [None, rotation] {
+                let curve = Some(FlowCurve { strength, smallest: 1e-6, largest: 1e6 });
+                list.push(Law { shear, rotation, compliance: 0.0, curve });
+            }
+        }
+    }
+    list
+}
+
+/// The stress of a law at given rates, as a vector.
+fn stress_at(
+    law: &Law,
+    orientation: &Orientation,
+    r: &Vector6<f64>,
+    pressure: f64,
+) -> Vector6<f64> {
+    let flow = LocalFlow { rates: rates_of(r), pressure };
+    let here = Here { flow: Some(flow), ..Here::without_flow(1.0, orientation) };
+    let s = law.at(&here).stress(&rates_of(r), 1.0);
+    Vector6::from([s.deviator[0], s.deviator[1], s.mean, s.skew, s.couple[0], s.couple[1]])
+}
+
+#[test]
+fn the_derivative_of_a_flow_curve_is_that_of_the_stress_and_is_positive() {
+    for law in generalised() {
+        for angle in ANGLES {
+            let orientation = Orientation::of([angle.cos(), angle.sin()]);
+            let (r, pressure) = (Vector6::from(SOME), 5.0);
+            let flow = Some(LocalFlow { rates: rates_of(&r), pressure });
+            let here = Here { flow, ..Here::without_flow(1.0, &orientation) };
+            let (point, softening) = (law.at(&here), law.softening(&here).expect("it flows"));
+            let e = softening.direction;
+            let e = [e.deviator[0], e.deviator[1], e.mean, e.skew, e.couple[0], e.couple[1]];
+            let e = Vector6::from(e);
+            let mut tangent = Matrix6::zeros();
+            for k in 0..6 {
+                let mut unit = Vector6::zeros();
+                unit[k] = 1.0;
+                let s = point.stress(&rates_of(&unit), 1.0);
+                let linear =
+                    [s.deviator[0], s.deviator[1], s.mean, s.skew, s.couple[0], s.couple[1]];
+                let column = Vector6::from(linear) + softening.factor * e[k] * e;
+                tangent.set_column(k, &column);
+                let step = 1e-5 * unit;
+                let [low, high] =
+                    [r - step, r + step].map(|r| stress_at(&law, &orientation, &r, pressure));
+                let found = (high - low) / 2e-5;
+                assert!((column - found).norm() < 1e-6 * found.norm().max(1.0), "{law:?}");
+            }
+            // Rates without resistance (the rotation of a classical fluid) have the value zero.
+            let least = tangent.symmetric_eigenvalues().min();
+            assert!(least > -1e-9 * tangent.norm(), "{law:?}: {least}");
+        }
+    }
+}
+
+#[test]
+fn a_flow_curve_turns_with_the_flow() {
+    for law in generalised() {
+        let rates = rates_of(&Vector6::from(SOME));
+        let power = |turn: f64| {
+            let orientation = Orientation::of([(0.3 + turn).cos(), (0.3 + turn).sin()]);
+            let (s, c) = (2.0 * turn).sin_cos();
+            let [a, b] = rates.d;
+            let (sk, ck) = turn.sin_cos();
+            let [x, y] = rates.kappa;
+            let kappa = [ck * x - sk * y, sk * x + ck * y];
+            let turned = Rates { d: [c * a - s * b, s * a + c * b], kappa, ..rates };
+            let flow = Some(LocalFlow { rates: turned, pressure: 3.0 });
+            let here = Here { flow, ..Here::without_flow(1.0, &orientation) };
+            law.at(&here).power(&turned)
+        };
+        for turn in [0.4, 1.9, -2.2] {
+            assert!((power(turn) / power(0.0) - 1.0).abs() < 1e-12, "{law:?}");
+        }
+    }
+}
+
+#[test]
+fn a_flow_curve_without_yield_is_the_linear_law() {
+    let strength = Strength::HerschelBulkley { yield_stress: 0.0, consistency: ETA, index: 1.0 };
+    let curve = Some(FlowCurve { strength, smallest: 1e-9 * ETA, largest: 1e9 * ETA });
+    let (coupling, couple) = (0.7, 0.3);
+    let relative = Law { rotation: Some(Cosserat { coupling, couple }), curve, ..Law::default() };
+    let rotation = Some(Cosserat { coupling: ETA * coupling, couple: ETA * couple });
+    let linear = Law { rotation, ..Law::default() };
+    let orientation = Orientation::default();
+    let r = Vector6::from(SOME);
+    let found = stress_at(&relative, &orientation, &r, 0.0);
+    let here = Here::without_flow(ETA, &orientation);
+    let s = linear.at(&here).stress(&rates_of(&r), 1.0);
+    let s = Vector6::from([s.deviator[0], s.deviator[1], s.mean, s.skew, s.couple[0], s.couple[1]]);
+    assert!((found - s).norm() < 1e-12 * s.norm());
 }

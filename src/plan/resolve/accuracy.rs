@@ -26,6 +26,13 @@ pub(super) fn method(scene: &Scene) -> Result<Method> {
             "give 1e-14 to 1e-2; 1e-12 is the limit of double precision in stiff scenes",
         ));
     }
+    if !(a.nonlinear_tolerance >= 1e-10 && a.nonlinear_tolerance <= 0.1) {
+        return Err(SceneError::of_key(
+            "accuracy.nonlinear_tolerance",
+            format!("accuracy.nonlinear_tolerance is {}", a.nonlinear_tolerance),
+            "give 1e-10 to 0.1; 1e-3 is usual",
+        ));
+    }
     if !(0.0..=2.0).contains(&a.stabilisation) {
         return Err(SceneError::of_key(
             "accuracy.stabilisation",
@@ -46,6 +53,7 @@ pub(super) fn method(scene: &Scene) -> Result<Method> {
         integrator: a.integrator,
         stabilisation: None,
         tolerance: a.tolerance,
+        nonlinear_tolerance: a.nonlinear_tolerance,
         max_corrections: a.max_corrections,
     })
 }

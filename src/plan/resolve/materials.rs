@@ -1,7 +1,9 @@
 //! This module resolves the `[materials]` tables and gravity into checked values in SI units.
 
+use super::flow_curves::{self, Generalised, Surroundings, generalised};
 use super::values::{Result, finite_range, not_negative, positive, ranges};
 use crate::laws::cosserat::{self, Cosserat};
+use crate::laws::flow_curve::FlowCurve;
 use crate::laws::{Law, Shear, granular};
 use crate::plan::material::Material;
 use crate::plan::{MAX_MATERIALS, Matter, Units, Warning};
@@ -41,8 +43,11 @@ pub(super) struct SiMaterial {
     pub(super) density: f64,
     pub(super) density_field: Option<FieldFn>,
     pub(super) compliance: f64,
+    /// Viscosities of the rotation; relative to the shear viscosity if there is a flow curve.
     pub(super) rotation: Option<Cosserat>,
+    /// Viscosity of shear along the layers; relative to the shear viscosity if there is a flow curve.
     pub(super) layer_viscosity: Option<f64>,
+    pub(super) curve: Option<FlowCurve>,
     pub(super) background: bool,
 }
 
@@ -60,8 +65,9 @@ impl SiMatter {
         let mut warnings = Vec::new();
         let mut materials = Vec::new();
         let mut errors = Vec::new();
+        let around = Surroundings::new(scene, scope, gravity)?;
         for (name, m) in &scene.materials {
-            match SiMaterial::new(name, m, scope, [x, y], &mut warnings) {
+            match SiMaterial::new((name, m), (scene, scope), &around, [x, y], &mut warnings) {
                 Ok(m) => materials.push(m),
                 Err(e) => errors.push(e),
             }
@@ -83,23 +89,28 @@ impl SiMatter {
         let materials = self
             .materials
             .iter()
-            .map(|m| Material {
-                name: m.name.clone(),
-                viscosity: m.viscosity / u.viscosity,
-                carries_viscosity: m.viscosity_field.is_some(),
-                density: m.density / u.density,
-                carries_density: m.density_field.is_some(),
-                law: Law {
-                    shear: m.layer_viscosity.map_or(Shear::Newtonian, |v| Shear::Layered {
-                        layer_viscosity: v / u.viscosity,
-                    }),
-                    rotation: m.rotation.map(|r| Cosserat {
-                        coupling: r.coupling / u.viscosity,
-                        couple: r.couple / u.couple_viscosity(),
-                    }),
-                    compliance: m.compliance * u.viscosity,
-                },
-                background: m.background,
+            .map(|m| {
+                // With a flow curve, the viscosities of the law are relative.
+                let viscosity = if m.curve.is_some() { 1.0 } else { u.viscosity };
+                Material {
+                    name: m.name.clone(),
+                    viscosity: m.viscosity / u.viscosity,
+                    carries_viscosity: m.viscosity_field.is_some(),
+                    density: m.density / u.density,
+                    carries_density: m.density_field.is_some(),
+                    law: Law {
+                        shear: m.layer_viscosity.map_or(Shear::Newtonian, |v| Shear::Layered {
+                            layer_viscosity: v / viscosity,
+                        }),
+                        rotation: m.rotation.map(|r| Cosserat {
+                            coupling: r.coupling / viscosity,
+                            couple: r.couple / (viscosity * u.length * u.length),
+                        }),
+                        compliance: m.compliance * u.viscosity,
+                        curve: m.curve.map(|c| flow_curves::scaled(&c, u)),
+                    },
+                    background: m.background,
+                }
             })
             .collect();
         let gravity = self.gravity.map(|g| g / u.acceleration());
@@ -109,9 +120,9 @@ impl SiMatter {
 
 impl SiMaterial {
     fn new(
-        name: &str,
-        m: &scene::Material,
-        scope: &Scope,
+        (name, m): (&str, &scene::Material),
+        (scene, scope): (&Scene, &Scope),
+        around: &Surroundings,
         domain: [[f64; 2]; 2],
         warnings: &mut Vec<Warning>,
     ) -> Result<SiMaterial> {
@@ -148,7 +159,10 @@ impl SiMaterial {
                 }))
             })
             .transpose()?;
+        let most = density_range[1].max(0.0);
+        let curve = generalised((name, m), (scene, scope), around, most, contacts)?;
         let (shear, range) = match (&m.shear_viscosity, contacts) {
+            _ if let Some(g) = &curve => (FieldFn::Constant(g.nominal), [g.nominal; 2]),
             (Some(q), None) => {
                 let f = q.compile(scope)?;
                 let range = finite_range(q, &f, domain, "shear_viscosity")?;
@@ -173,11 +187,22 @@ impl SiMaterial {
                 return Err(SceneError::of_key(
                     format!("materials.{name}"),
                     format!("material `{name}` has no viscosity"),
-                    "give shear_viscosity = <Pa s>, or a granular table",
+                    "give shear_viscosity = <Pa s>, or a friction or granular table",
                 ));
             }
         };
         let coupling = match (&m.coupling_viscosity, contacts) {
+            _ if let Some(g) = &curve => g.coupling_ratio,
+            _ if let Some(q) = &m.coupling_ratio => {
+                let Some(eta) = shear.constant() else {
+                    return Err(SceneError::at(
+                        q,
+                        format!("material `{name}`: shear_viscosity is not a constant"),
+                        "coupling_ratio needs a constant viscosity; give coupling_viscosity",
+                    ));
+                };
+                not_negative(q, scope, "coupling_ratio")? * eta
+            }
             (Some(q), _) => not_negative(q, scope, "coupling_viscosity")?,
             (None, Some(c)) => c.coupling,
             (None, None) => 0.0,
@@ -197,8 +222,10 @@ impl SiMaterial {
             }
         };
         let rotation = (coupling > 0.0 && couple > 0.0).then_some(Cosserat { coupling, couple });
-        let length_alone =
-            coupling == 0.0 && m.internal_length.is_some() && m.coupling_viscosity.is_none();
+        let length_alone = coupling == 0.0
+            && m.internal_length.is_some()
+            && m.coupling_viscosity.is_none()
+            && m.coupling_ratio.is_none();
         if length_alone || coupling > 0.0 && couple == 0.0 && m.internal_length.is_none() {
             warnings.push(Warning::NoInternalLength { material: name.into() });
         }
@@ -213,8 +240,9 @@ impl SiMaterial {
             .map(|q| positive(q, scope, "layer_viscosity"))
             .transpose()?
             .filter(|&eta_s| shear.constant() != Some(eta_s));
+        let layer = curve.as_ref().map_or(layer, |g| g.layer_ratio);
         if let Some(eta_s) = layer
-            && eta_s > range[0]
+            && eta_s > if curve.is_some() { 1.0 } else { range[0] }
         {
             warnings.push(Warning::StiffLayers { material: name.into(), ratio: eta_s / range[0] });
         }
@@ -234,6 +262,7 @@ impl SiMaterial {
             compliance: bulk.map_or(0.0, |b| 1.0 / b),
             rotation,
             layer_viscosity: layer,
+            curve: curve.map(|g: Generalised| g.curve),
             background: m.background,
         };
         if out.background

@@ -3,10 +3,12 @@
 
 mod accuracy;
 mod dye;
+mod flow_curves;
 mod gauges;
 mod materials;
 mod mesh;
 mod null_spaces;
+mod pressure;
 mod recording;
 mod regions;
 mod scales;
@@ -140,6 +142,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         .filter(|_| has_density);
     null_spaces::check_null_spaces(scene, &boundary, &mesh, &units, &effects, body_force.as_ref())?;
 
+    let pressure_reference =
+        pressure::reference(scene, scope, (&mesh, &units), (&boundary, &regions))?;
     let initial = si
         .materials
         .iter()
@@ -156,6 +160,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         units,
         enclosure,
         boundary,
+        pressure_reference,
         state,
         changes: vec![],
         regions,

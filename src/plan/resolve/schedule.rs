@@ -107,6 +107,10 @@ fn apply(scene: &mut Scene, change: &Change, index: usize) -> Result<()> {
                 scene.gravity[1] = value.clone();
                 true
             }
+            ["materials", name, "friction", field] => {
+                let friction = scene.materials.get_mut(*name).and_then(|m| m.friction.as_mut());
+                friction.is_some_and(|f| set_friction(f, field, value))
+            }
             ["materials", name, field] => match scene.materials.get_mut(*name) {
                 Some(m) => set_material(m, field, value),
                 None => false,
@@ -124,6 +128,18 @@ fn apply(scene: &mut Scene, change: &Change, index: usize) -> Result<()> {
     Ok(())
 }
 
+fn set_friction(f: &mut scene::Friction, field: &str, value: &Quantity) -> bool {
+    match field {
+        "static" => f.at_rest = value.clone(),
+        "dynamic" => f.dynamic = Some(value.clone()),
+        "inertial_number" => f.inertial_number = value.clone(),
+        "grain_diameter" => f.grain_diameter = value.clone(),
+        "grain_density" => f.grain_density = Some(value.clone()),
+        _ => return false,
+    }
+    true
+}
+
 fn set_material(m: &mut scene::Material, field: &str, value: &Quantity) -> bool {
     match field {
         "density" => m.density = value.clone().into(),
@@ -133,6 +149,13 @@ fn set_material(m: &mut scene::Material, field: &str, value: &Quantity) -> bool 
         "internal_length" => m.internal_length = Some(value.clone()),
         "couple_viscosity" => m.couple_viscosity = Some(value.clone()),
         "layer_viscosity" => m.layer_viscosity = Some(value.clone()),
+        "coupling_ratio" => m.coupling_ratio = Some(value.clone()),
+        "layer_ratio" => m.layer_ratio = Some(value.clone()),
+        "cohesion" => m.cohesion = Some(value.clone()),
+        "yield_stress" => m.yield_stress = Some(value.clone()),
+        "flow_index" => m.flow_index = Some(value.clone()),
+        "largest_viscosity" => m.largest_viscosity = Some(value.clone()),
+        "smallest_viscosity" => m.smallest_viscosity = Some(value.clone()),
         _ => return false,
     }
     true

@@ -1,0 +1,224 @@
+//! This module solves for the flow of generalised fluids, whose viscosity depends on the rates and
+//! on the pressure, by Newton's method at fixed pressure.
+//!
+//! At fixed pressure of the laws, the flow is the minimum of a convex functional `F(u)` on the flows
+//! without divergence (see [`flow_curve`](crate::laws::flow_curve)). Each iteration factors the
+//! matrix with the derivatives of the stresses, computes one correction `du, dp`, and looks along
+//! it for the minimum,
+//!
+//! ```text
+//! s(a) = r(u + a du) . du = -dF/da,   s(0) = du . J du > 0
+//! ```
+//! The whole step is taken unless it goes too far (`s(1) < 0` and large). Then the laws take the new
+//! pressure. The iteration ends with the correction whose norm, that of the dissipated power,
+//!
+//! ```text
+//! sqrt(s(0) / dissipation)        (Newton decrement, relative)
+//! ```
+//! is below the tolerance: an estimate of the relative error before that correction. It does not
+//! depend on units, on the mesh, or on the contrast of viscosities.
+
+use super::last_flow::Iterate;
+use super::problem::{Residual, Stokes, Work, add_scaled};
+use super::quadrature::Quadrature;
+use super::report::{Report, SolveError, Stopping};
+use super::stokes::Loads;
+use crate::plan::material::Material;
+use crate::space::flow::Flow;
+use crate::space::particles::Particles;
+use crate::threads;
+use std::time::Instant;
+
+/// Largest number of iterations.
+const MOST_ITERATIONS: u32 = 100;
+/// Largest number of points at which the functional is evaluated along a correction.
+const MOST_PROBES: u32 = 10;
+/// A step is accepted if the slope of the functional has changed its sign by no more than this
+/// share of its slope at the start.
+const OVERSHOOT: f64 = 0.1;
+/// Relative decrement up to which the laws take the pressure of each iterate. Before, the pressure of
+/// material at rest, whose viscosity is large, is not known.
+const NEAR: f64 = 0.1;
+/// Divergence, relative to the strain rate, of a converged flow.
+const DIVERGENCE: f64 = 1e-8;
+/// Dissipation below this share of the scale of power is that of a scene at rest.
+const REST: f64 = 1e-9;
+
+/// The particles and materials that determine the laws.
+#[derive(Clone, Copy)]
+pub struct Matter<'a> {
+    /// Particles, sorted by cell.
+    pub particles: &'a Particles,
+    /// Materials.
+    pub materials: &'a [Material],
+}
+
+impl<const D: usize> Stokes<D> {
+    /// Solves for the flow of generalised fluids. `flow` holds the initial guess; `quadrature` was
+    /// updated with the same particles and materials.
+    ///
+    /// # Errors
+    /// [`SolveError`] if a matrix is not positive definite, the iteration does not converge, or the
+    /// solution is not finite.
+    pub fn solve_nonlinear(
+        &mut self,
+        quadrature: &mut Quadrature,
+        matter: Matter,
+        loads: Loads<D>,
+        stopping: Stopping,
+        flow: &mut Flow<D>,
+    ) -> Result<Report, SolveError> {
+        let mut report = Report::default();
+        let mut work = std::mem::take(&mut self.work);
+        let outcome =
+            self.newton(quadrature, matter, (loads, stopping), (flow, &mut report, &mut work));
+        self.work = work;
+        outcome.map(|()| report)
+    }
+
+    fn newton(
+        &mut self,
+        quadrature: &mut Quadrature,
+        matter: Matter,
+        (loads, stopping): (Loads<D>, Stopping),
+        (flow, report, work): (&mut Flow<D>, &mut Report, &mut Work<D>),
+    ) -> Result<(), SolveError> {
+        self.constraints.impose(&mut flow.velocity);
+        let (mut along, mut pressure) = (Flow::default(), flow.pressure.clone());
+        // Whether the last correction was computed with the pressure of its flow.
+        let mut current = true;
+        loop {
+            self.constraints.remove_null_space(&self.mesh, flow);
+            let near = report.decrement.is_none_or(|d| d <= NEAR);
+            if near {
+                pressure.clone_from(&flow.pressure);
+            }
+            self.relax(quadrature, matter, flow, &pressure);
+            let clock = Instant::now();
+            report.active_rotation = self.assemble(quadrature, loads.terms);
+            report.seconds.assemble += clock.elapsed().as_secs_f64();
+            let clock = Instant::now();
+            self.residual(quadrature, loads, flow, work);
+            self.report(&work.residual, loads, flow, report)?;
+            let converged = report.decrement.is_some_and(|d| d <= stopping.nonlinear);
+            if converged && current && report.divergence <= DIVERGENCE {
+                report.seconds.solve += clock.elapsed().as_secs_f64();
+                return Ok(());
+            }
+            if report.iterations == MOST_ITERATIONS {
+                let [x, y] = self.largest_residual(&work.residual);
+                return Err(SolveError::Nonlinear {
+                    iterations: report.iterations,
+                    decrement: report.decrement.unwrap_or(f64::INFINITY),
+                    x,
+                    y,
+                });
+            }
+            report.seconds.solve += clock.elapsed().as_secs_f64();
+            let clock = Instant::now();
+            self.factor.factorize(&self.matrices.blocks).map_err(|e| self.explain(e))?;
+            report.seconds.factor += clock.elapsed().as_secs_f64();
+            let clock = Instant::now();
+            self.correct(quadrature, work);
+            (report.corrections, report.iterations) =
+                (report.corrections + 1, report.iterations + 1);
+            current = near;
+            let slope = self.slope(work);
+            let power = report.dissipation.max(REST * report.power_scale);
+            report.decrement = Some((slope.abs() / power).sqrt());
+            let share =
+                self.search(quadrature, matter, loads, (flow, &pressure, &mut along), work, slope);
+            add_scaled(&mut flow.velocity, share, &work.correction.velocity);
+            add_scaled(&mut flow.pressure, share, &work.correction.pressure);
+            report.seconds.solve += clock.elapsed().as_secs_f64();
+        }
+    }
+
+    /// Evaluates the laws at the velocity of a flow and at a pressure.
+    fn relax(
+        &self,
+        quadrature: &mut Quadrature,
+        Matter { particles, materials }: Matter,
+        flow: &Flow<D>,
+        pressure: &[[f64; 3]],
+    ) {
+        let at = Iterate { mesh: &self.mesh, velocity: &flow.velocity, pressure };
+        quadrature.reevaluate(&self.mesh, particles, materials, &at);
+    }
+
+    /// `r . du`, the power of the residual with the correction.
+    fn slope(&self, work: &Work<D>) -> f64 {
+        let (force, du) = (&work.residual.force, &work.correction.velocity);
+        let [slope] = threads::sum(0..self.mesh.nodes(), |node| {
+            let free = (0..D).filter(|&c| !self.constraints.is_fixed(node, c));
+            [free.map(|c| force[node][c] * du[node][c]).sum()]
+        });
+        slope
+    }
+
+    /// Share of the correction to be applied, at most one. `slope`: that at the start.
+    fn search(
+        &mut self,
+        quadrature: &mut Quadrature,
+        matter: Matter,
+        loads: Loads<D>,
+        (flow, pressure, along): (&Flow<D>, &[[f64; 3]], &mut Flow<D>),
+        work: &mut Work<D>,
+        slope: f64,
+    ) -> f64 {
+        // Ends of the interval that holds the minimum, with their slopes.
+        let (mut low, mut high) = ([0.0, slope], None::<[f64; 2]>);
+        let mut share = 1.0;
+        for _ in 0..MOST_PROBES {
+            along.copy_from(flow);
+            add_scaled(&mut along.velocity, share, &work.correction.velocity);
+            add_scaled(&mut along.pressure, share, &work.correction.pressure);
+            self.relax(quadrature, matter, along, pressure);
+            if self.matrices.rotation.iter().any(Option::is_some) {
+                self.assemble(quadrature, loads.terms);
+            }
+            self.residual(quadrature, loads, along, work);
+            let here = self.slope(work);
+            if here >= -OVERSHOOT * slope.abs() && (share == 1.0 || here <= OVERSHOOT * slope.abs())
+            {
+                break;
+            }
+            if here < 0.0 || here.is_nan() {
+                high = Some([share, here]);
+            } else {
+                low = [share, here];
+            }
+            let Some(high) = high else { break };
+            let [a, b] = [low, high];
+            // The secant, kept away from the ends of the interval.
+            let secant = a[0] + (b[0] - a[0]) * a[1] / (a[1] - b[1]);
+            let margin = 0.1 * (b[0] - a[0]);
+            share = if secant.is_finite() {
+                secant.clamp(a[0] + margin, b[0] - margin)
+            } else {
+                0.5 * (a[0] + b[0])
+            };
+        }
+        share
+    }
+
+    /// Sets the norms and powers of a residual in the report.
+    fn report(
+        &self,
+        residual: &Residual<D>,
+        loads: Loads<D>,
+        flow: &Flow<D>,
+        report: &mut Report,
+    ) -> Result<(), SolveError> {
+        (report.residual, report.divergence, _, report.power_scale) =
+            self.norms(residual, loads.nodal, flow);
+        report.dissipation = residual.dissipation;
+        report.restoring = residual.restoring;
+        report.power_in = self.power_in(residual, loads.nodal, flow);
+        if report.residual.is_finite() && report.divergence.is_finite() {
+            Ok(())
+        } else {
+            Err(SolveError::NonFinite { corrections: report.corrections })
+        }
+    }
+}
