@@ -1,25 +1,75 @@
 //! This module turns the boundary conditions of a scene into constraints.
 
-use super::resolve::values::{Result, edge, finite_range};
+use super::resolve::values::Result;
 use super::resolve::walls::Walls;
 use super::{Matter, Units};
-use crate::scene::{BoundaryKind, Field, FieldFn, Scene, SceneError, Scope, WallKind};
+use crate::scene::{FieldFn, SceneError, WallKind};
 use crate::space::constraints::Constraints;
 use crate::space::mesh::Mesh;
 use crate::space::segment::Segment;
-use crate::space::shape::side_normal;
+use crate::space::shape::{SIDE_NODES, side_normal};
 
-/// Boundary conditions at a side of the domain, as functions of SI coordinates.
+/// Boundary conditions, as functions of SI coordinates.
 #[derive(Clone, Debug, Default)]
-pub struct Side {
-    /// Whether the side is joined to the opposite side.
-    pub periodic: bool,
+pub struct Conditions {
     /// Prescribed velocity along x and y, m/s.
     pub velocity: [Option<FieldFn>; 2],
     /// Prescribed traction along x and y, Pa.
     pub traction: [Option<FieldFn>; 2],
     /// Prescribed Cosserat rotation rate, 1/s.
     pub rotation: Option<FieldFn>,
+}
+
+impl Conditions {
+    /// Whether a velocity other than zero is prescribed along `normal`.
+    pub fn passes_through(&self, normal: usize) -> bool {
+        self.velocity[normal].as_ref().is_some_and(|f| f.constant() != Some(0.0))
+    }
+
+    /// Whether a component of the velocity is prescribed as zero.
+    fn stops(&self, c: usize) -> bool {
+        self.velocity[c].as_ref().and_then(FieldFn::constant) == Some(0.0)
+    }
+}
+
+/// A piece of a side with the same conditions everywhere: a part that the scene lists, or what lies
+/// between parts.
+#[derive(Clone, Debug)]
+pub struct Piece {
+    /// Index in the scene's list of parts; `None` for the rest of the side.
+    pub part: Option<usize>,
+    /// Its extent. In a [`BoundaryPlan`] it is in the plan's units and ends on mesh lines.
+    pub segment: Segment,
+    /// Conditions that apply.
+    pub conditions: Conditions,
+    /// Whether particles leave through it.
+    pub open: bool,
+}
+
+/// A side of the domain.
+#[derive(Clone, Debug, Default)]
+pub struct Side {
+    /// Whether the side is joined to the opposite side.
+    pub periodic: bool,
+    /// The pieces, in ascending order; they cover the side.
+    pub pieces: Vec<Piece>,
+}
+
+impl Side {
+    /// The pieces, those that constrain the flow most first. Where two pieces meet, the conditions
+    /// of the first apply: those of walls before those of openings, and of walls at rest before
+    /// those of moving walls.
+    fn most_constraining_first(&self) -> Vec<&Piece> {
+        let mut out: Vec<&Piece> = self.pieces.iter().collect();
+        // The last criterion does not depend on the direction along the side.
+        out.sort_by_key(|p| {
+            let normal = p.segment.normal;
+            let Conditions { velocity, .. } = &p.conditions;
+            let free = velocity.iter().filter(|v| v.is_none()).count();
+            (!p.conditions.stops(normal), !p.conditions.stops(1 - normal), free, p.part)
+        });
+        out
+    }
 }
 
 /// A wall along mesh lines.
@@ -49,27 +99,36 @@ pub struct BoundaryPlan {
 /// Names of the sides, in the order of [`BoundaryPlan::sides`].
 pub const SIDES: [&str; 4] = ["left", "right", "bottom", "top"];
 
-/// Mesh nodes on a side.
-fn side_nodes(mesh: &Mesh, side: usize) -> Vec<usize> {
-    let (ni, nj) = (mesh.x.nodes(), mesh.y.nodes());
-    match side {
-        0 => (0..nj).map(|j| mesh.node(0, j)).collect(),
-        1 => (0..nj).map(|j| mesh.node(ni - 1, j)).collect(),
-        2 => (0..ni).map(|i| mesh.node(i, 0)).collect(),
-        _ => (0..ni).map(|i| mesh.node(i, nj - 1)).collect(),
-    }
+/// Key of a piece in the scene, such as `boundaries.bottom.parts[0]`.
+pub(super) fn place_of(side: usize, piece: &Piece) -> String {
+    let part = piece.part.map_or(String::new(), |k| format!(".parts[{k}]"));
+    format!("boundaries.{}{part}", SIDES[side])
+}
+
+/// Pieces of the sides that are not periodic, with the numbers of their sides.
+pub(super) fn pieces(sides: &[Side; 4]) -> impl Iterator<Item = (usize, &Piece)> {
+    let bounding = sides.iter().enumerate().filter(|(_, side)| !side.periodic);
+    bounding.flat_map(|(s, side)| side.pieces.iter().map(move |piece| (s, piece)))
 }
 
 impl BoundaryPlan {
+    /// Pieces of the sides that are not periodic, with the numbers of their sides.
+    pub fn pieces(&self) -> impl Iterator<Item = (usize, &Piece)> {
+        pieces(&self.sides)
+    }
+
     /// Prescribed nodal values. Where boundaries meet, normal velocities take precedence over
     /// tangential ones.
     pub fn constraints<const D: usize>(&self, mesh: &Mesh, units: &Units) -> Constraints<D> {
         let mut out = Constraints::new(mesh);
+        let sides = self.sides.each_ref().map(Side::most_constraining_first);
+        let pieces = || sides.iter().flatten();
         for pass in 0..2 {
-            for (s, side) in self.sides.iter().enumerate().filter(|(_, s)| !s.periodic) {
-                let c = if pass == 0 { side_normal(s) } else { 1 - side_normal(s) };
-                if let Some(f) = &side.velocity[c] {
-                    for node in side_nodes(mesh, s) {
+            for piece in pieces() {
+                let normal = piece.segment.normal;
+                let c = if pass == 0 { normal } else { 1 - normal };
+                if let Some(f) = &piece.conditions.velocity[c] {
+                    for node in piece.segment.nodes(mesh) {
                         out.fix(node, c, self.at_node(mesh, units, f, node) / units.velocity());
                     }
                 }
@@ -83,9 +142,9 @@ impl BoundaryPlan {
             }
         }
         if D == 3 {
-            for (s, side) in self.sides.iter().enumerate() {
-                if let Some(f) = &side.rotation {
-                    for node in side_nodes(mesh, s) {
+            for piece in pieces() {
+                if let Some(f) = &piece.conditions.rotation {
+                    for node in piece.segment.nodes(mesh) {
                         out.fix(node, 2, self.at_node(mesh, units, f, node) / units.rate());
                     }
                 }
@@ -117,18 +176,17 @@ impl BoundaryPlan {
     pub fn net_outflow<const D: usize>(&self, mesh: &Mesh, given: &Constraints<D>) -> (f64, f64) {
         const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
         let (mut net, mut total) = (0.0, 0.0);
-        for (s, side) in self.sides.iter().enumerate().filter(|(_, s)| !s.periodic) {
+        for (s, piece) in self.pieces() {
             let normal = side_normal(s);
-            if side.velocity[normal].is_none() {
+            if piece.conditions.velocity[normal].is_none() {
                 continue;
             }
             let sign = if s % 2 == 0 { -1.0 } else { 1.0 };
             let (_, axis) = mesh.axes(normal);
-            let nodes = side_nodes(mesh, s);
-            for k in 0..axis.cells() {
-                for (a, weight) in SIMPSON.iter().enumerate() {
-                    let node = nodes[axis.cell_node(k, a)];
-                    let v = given.fixed_value(node, normal).unwrap_or(0.0);
+            for (k, cell) in piece.segment.cells_at_side(mesh, s) {
+                let nodes = mesh.cell_nodes(cell);
+                for (a, weight) in SIDE_NODES[s].into_iter().zip(SIMPSON) {
+                    let v = given.fixed_value(nodes[a], normal).unwrap_or(0.0);
                     net += sign * weight * axis.size(k) * v;
                     total += weight * axis.size(k) * v.abs();
                 }
@@ -138,66 +196,17 @@ impl BoundaryPlan {
     }
 }
 
-/// Boundary conditions at the four sides of the domain.
-pub(super) fn sides(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<[Side; 4]> {
-    let mut out: [Side; 4] = Default::default();
-    for (s, side) in scene.boundaries.sides().into_iter().enumerate() {
-        let name = format!("boundaries.{}", SIDES[s]);
-        let normal = side_normal(s);
-        let velocity = [&side.velocity_x, &side.velocity_y];
-        let traction = [&side.traction_x, &side.traction_y];
-        if side.kind == BoundaryKind::Periodic {
-            if let Some(f) =
-                velocity.into_iter().chain(traction).chain([&side.rotation]).flatten().next()
-            {
-                return Err(SceneError::at(
-                    f,
-                    format!("{name} is periodic and prescribes a value"),
-                    "a periodic side has no boundary: remove the value or the kind",
-                ));
-            }
-            out[s].periodic = true;
-            continue;
-        }
-        let compile = |f: &Field| -> Result<FieldFn> {
-            let compiled = f.compile(scope)?;
-            finite_range(f, &compiled, edge(domain, s), &name)?;
-            Ok(compiled)
-        };
-        for c in 0..2 {
-            let held = match side.kind {
-                BoundaryKind::NoSlip => true,
-                BoundaryKind::FreeSlip => c == normal,
-                BoundaryKind::Open | BoundaryKind::Periodic => false,
-            };
-            let letter = ["x", "y"][c];
-            out[s].velocity[c] = match (velocity[c], traction[c]) {
-                (Some(v), None) => Some(compile(v)?),
-                (None, Some(_)) => None,
-                (Some(v), Some(_)) => {
-                    return Err(SceneError::at(
-                        v,
-                        format!("{name} gives both velocity_{letter} and traction_{letter}"),
-                        "give one of them",
-                    ));
-                }
-                (None, None) => held.then_some(FieldFn::Constant(0.0)),
-            };
-            out[s].traction[c] = traction[c].as_ref().map(compile).transpose()?;
-        }
-        out[s].rotation = side.rotation.as_ref().map(compile).transpose()?;
-    }
-    Ok(out)
-}
-
-/// Boundary conditions of sides, walls and blocks on the mesh.
+/// Boundary conditions of sides, walls and blocks on the mesh. The segments of `sides` are in m.
 pub(super) fn boundary(
-    sides: [Side; 4],
+    mut sides: [Side; 4],
     walls: &Walls,
     mesh: &Mesh,
     units: &Units,
     state: &Matter,
 ) -> Result<BoundaryPlan> {
+    for piece in sides.iter_mut().flat_map(|side| &mut side.pieces) {
+        piece.segment = piece.segment.on_mesh(mesh, units.length);
+    }
     let mut lines = Vec::new();
     let mut add = |segment: Segment, kind: WallKind, rotation| {
         let segment = segment.on_mesh(mesh, units.length);
@@ -215,16 +224,13 @@ pub(super) fn boundary(
         }
     }
     let held = |c: usize| {
-        sides.iter().any(|s| s.velocity[c].is_some())
+        pieces(&sides).any(|(_, p)| p.conditions.velocity[c].is_some())
             || lines.iter().any(|w| w.segment.normal == c || w.no_slip)
     };
     let free_translation = [!held(0), !held(1)];
     let compressible = state.materials.iter().any(|m| m.law.compliance > 0.0);
     let closed = !compressible
-        && sides
-            .iter()
-            .enumerate()
-            .all(|(s, b)| b.periodic || b.velocity[side_normal(s)].is_some());
+        && pieces(&sides).all(|(s, p)| p.conditions.velocity[side_normal(s)].is_some());
     let plan = BoundaryPlan { sides, walls: lines, free_translation, closed };
     if closed {
         let (net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
@@ -235,7 +241,7 @@ pub(super) fn boundary(
                     "the given normal velocities let {:.3e} m2/s of incompressible fluid flow out",
                     net * units.area_rate()
                 ),
-                "make them balance, open a side (kind = \"open\"), or give a bulk_viscosity",
+                "make them balance, open a side or a part of one (kind = \"outflow\"), or give a bulk_viscosity",
             ));
         }
     }

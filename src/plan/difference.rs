@@ -36,9 +36,11 @@ impl Plan {
     }
 }
 
-/// Open sides, free translations and whether the domain is closed, without prescribed values.
-fn supports(p: &Plan) -> ([bool; 4], [bool; 2], bool) {
-    (p.enclosure.open, p.boundary.free_translation, p.boundary.closed)
+/// Open ranges of the sides (m), free translations and whether the domain is closed, without prescribed values.
+fn supports(p: &Plan) -> ([Vec<[f64; 2]>; 4], [bool; 2], bool) {
+    let si =
+        |ranges: &Vec<[f64; 2]>| ranges.iter().map(|r| r.map(|v| v * p.units.length)).collect();
+    (p.enclosure.open.each_ref().map(si), p.boundary.free_translation, p.boundary.closed)
 }
 
 /// Gauges, dye lines and marks in SI units.

@@ -1,7 +1,7 @@
 //! This module computes the loads that are constant during a run: `integral t . u~` of tractions on
 //! the sides, and `integral f . u~ + c w~` of body forces and couples fixed in space.
 
-use super::boundary::{BoundaryPlan, Side};
+use super::boundary::BoundaryPlan;
 use super::{Plan, Units};
 use crate::scene::FieldFn;
 use crate::space::mesh::Mesh;
@@ -23,7 +23,7 @@ pub fn fixed_loads<const D: usize>(
     units: &Units,
 ) -> Vec<[f64; D]> {
     let mut load = vec![[0.0; D]; mesh.nodes()];
-    add_tractions(&boundary.sides, mesh, units, &mut load);
+    add_tractions(boundary, mesh, units, &mut load);
     if let Some(f) = body_force {
         add_body_force(mesh, units, f, &mut load);
     }
@@ -32,20 +32,17 @@ pub fn fixed_loads<const D: usize>(
 
 /// Adds the nodal forces of prescribed tractions, integrated with 5 Gauss points per face.
 fn add_tractions<const D: usize>(
-    sides: &[Side; 4],
+    boundary: &BoundaryPlan,
     mesh: &Mesh,
     units: &Units,
     load: &mut [[f64; D]],
 ) {
-    for (s, side) in sides.iter().enumerate() {
+    for (s, piece) in boundary.pieces() {
         let normal = side_normal(s);
         let edge = if s % 2 == 0 { -1.0 } else { 1.0 };
-        let (across, along) = mesh.axes(normal);
         for c in 0..2 {
-            let Some(f) = &side.traction[c] else { continue };
-            for k in 0..along.cells() {
-                let m = if s % 2 == 0 { 0 } else { across.cells() - 1 };
-                let cell = mesh.cell_across(normal, m, k);
+            let Some(f) = &piece.conditions.traction[c] else { continue };
+            for (_, cell) in piece.segment.cells_at_side(mesh, s) {
                 if mesh.solid[cell] {
                     continue;
                 }

@@ -17,7 +17,7 @@ mod resolve;
 pub mod units;
 mod warning;
 
-pub use boundary::{BoundaryPlan, Side, WallLine};
+pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
 pub use effects::{Effect, EffectKind, EffectList, StepTime};
 pub use resolve::resolve;
 pub use units::Units;
@@ -46,7 +46,7 @@ pub struct Plan {
     pub units: Units,
     /// The mesh.
     pub mesh: Arc<Mesh>,
-    /// Walls as obstacles, and the sides through which particles leave.
+    /// Walls as obstacles, and the ranges of the sides through which particles leave.
     pub enclosure: Enclosure,
     /// Boundary conditions.
     pub boundary: BoundaryPlan,
@@ -312,11 +312,11 @@ impl Plan {
     }
 
     /// Whether the potential energy of the particles and the work of loads determine the energy
-    /// balance: gravity acts, not along a periodic axis, no side is open, and volumes are constant.
+    /// balance: gravity acts, not along a periodic axis, no side has an opening, and volumes are constant.
     pub fn energy_tells(&self) -> bool {
         let (mesh, g) = (&self.mesh, self.state.gravity);
         let along_seam = mesh.x.periodic() && g[0] != 0.0 || mesh.y.periodic() && g[1] != 0.0;
-        let constant = !self.enclosure.open.contains(&true) && !self.effects.volume_change;
+        let constant = !self.enclosure.is_open() && !self.effects.volume_change;
         self.effects.gravity && constant && !along_seam
     }
 

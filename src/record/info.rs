@@ -4,6 +4,7 @@ use crate::frame::{
     Frame, Material, Outline, Plot, Quantity, Rect, RunInfo, Scalar, Series, Snapshot,
 };
 use crate::plan::Plan;
+use crate::plan::boundary::SIDES;
 use crate::scene::{ColourBy, FieldName, scene_hash, to_toml};
 use crate::sim::row::{Panel, Place, Row, places};
 use crate::space::segment::Segment;
@@ -17,18 +18,12 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
     let (x, y) = (&plan.mesh.x, &plan.mesh.y);
     let domain = Rect { min: [f(x.start()), f(y.start())], max: [f(x.end()), f(y.end())] };
     let ends = |s: &Segment| s.ends().map(|p| p.map(f)).to_vec();
-    let [[x0, y0], [x1, y1]] = [domain.min, domain.max];
-    let outlines = [
-        ("left", [[x0, y0], [x0, y1]]),
-        ("right", [[x1, y0], [x1, y1]]),
-        ("bottom", [[x0, y0], [x1, y0]]),
-        ("top", [[x0, y1], [x1, y1]]),
-    ];
-    let mut walls: Vec<Outline> = outlines
-        .into_iter()
-        .zip(&plan.boundary.sides)
-        .filter(|((_, _), side)| !side.periodic)
-        .map(|((name, points), _)| Outline { name: name.into(), points: points.to_vec() })
+    // Openings in a side are gaps in its line; a side without parts is drawn whole, open or not.
+    let mut walls: Vec<Outline> = plan
+        .boundary
+        .pieces()
+        .filter(|(s, piece)| plan.boundary.sides[*s].pieces.len() == 1 || !piece.open)
+        .map(|(s, piece)| Outline { name: SIDES[s].into(), points: ends(&piece.segment) })
         .collect();
     let names = plan
         .scene

@@ -119,7 +119,7 @@ pub struct Domain {
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
     /// Positions towards which cells become smaller. Absent: the ends of walls that face each other
-    /// across a gap, by a factor of 12; `[]`: none.
+    /// across a gap and the ends of openings in sides, by a factor of 12; `[]`: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grading: Option<Vec<Grading>>,
     /// Largest size ratio of neighbouring cells in graded parts.
@@ -147,9 +147,11 @@ pub struct Grading {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GradingTarget {
-    /// The ends of inner walls that face each other across a gap; if there are none, all free ends.
+    /// The ends of inner walls that face each other across a gap, and the ends of openings in sides;
+    /// if there are none, all free ends of walls.
     Apertures,
-    /// All no-slip walls and sides, and sides with a given tangential velocity or rotation.
+    /// All no-slip walls and sides, and sides with a given tangential velocity or rotation; a side
+    /// counts if one of its parts is such.
     Walls,
     /// A coordinate x, m.
     X(Quantity),
@@ -362,9 +364,81 @@ pub struct Boundary {
     /// Prescribed Cosserat rotation rate, 1/s; absent: free (no couple).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Field>,
+    /// Parts of the side with other conditions, such as openings; the rest of the side is as the
+    /// keys above say.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<BoundaryPart>,
 }
 
-/// Kinds of boundary conditions at a side of the domain.
+/// A part of a side with its own boundary conditions: `kind` sets defaults that the other keys
+/// override. Its ends become mesh lines. Where it meets the rest of the side, the conditions of
+/// walls apply.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoundaryPart {
+    /// Coordinate of the lower or left end along the side, m: x at the bottom and top, y at the
+    /// left and right.
+    pub from: Quantity,
+    /// Coordinate of the upper or right end along the side, m.
+    pub to: Quantity,
+    /// Kind of boundary condition; not `periodic`.
+    pub kind: BoundaryKind,
+    /// Prescribed velocity along x, m/s; may depend on x and y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_x: Option<Field>,
+    /// Prescribed velocity along y, m/s; may depend on x and y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_y: Option<Field>,
+    /// Prescribed traction on the fluid along x, Pa; excludes `velocity_x`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traction_x: Option<Field>,
+    /// Prescribed traction on the fluid along y, Pa; excludes `velocity_y`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traction_y: Option<Field>,
+    /// Prescribed Cosserat rotation rate, 1/s; absent: free (no couple).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<Field>,
+}
+
+/// Conditions that are written for a side or for a part of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Given<'a> {
+    /// Kind of boundary condition.
+    pub kind: BoundaryKind,
+    /// Prescribed velocity along x and y.
+    pub velocity: [Option<&'a Field>; 2],
+    /// Prescribed traction along x and y.
+    pub traction: [Option<&'a Field>; 2],
+    /// Prescribed Cosserat rotation rate.
+    pub rotation: Option<&'a Field>,
+}
+
+/// Implements `given` for types that have the keys of a side.
+macro_rules! given {
+    ($($type:ty),*) => {$(
+        impl $type {
+            /// The conditions that are written here.
+            pub fn given(&self) -> Given<'_> {
+                Given {
+                    kind: self.kind,
+                    velocity: [self.velocity_x.as_ref(), self.velocity_y.as_ref()],
+                    traction: [self.traction_x.as_ref(), self.traction_y.as_ref()],
+                    rotation: self.rotation.as_ref(),
+                }
+            }
+        }
+    )*};
+}
+given!(Boundary, BoundaryPart);
+
+impl Boundary {
+    /// The conditions of the side, followed by those of its parts.
+    pub fn all_given(&self) -> impl Iterator<Item = Given<'_>> {
+        std::iter::once(self.given()).chain(self.parts.iter().map(BoundaryPart::given))
+    }
+}
+
+/// Kinds of boundary conditions at a side of the domain or a part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BoundaryKind {
@@ -373,8 +447,11 @@ pub enum BoundaryKind {
     FreeSlip,
     /// Zero velocity.
     NoSlip,
-    /// Zero traction.
+    /// Zero traction: fluid passes in any direction. What enters is the background.
     Open,
+    /// Zero normal traction and zero tangential velocity: fluid passes along the normal, as from a
+    /// slit into the open air. What enters is the background.
+    Outflow,
     /// Joined to the opposite side, which must also be periodic.
     Periodic,
 }

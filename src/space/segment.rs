@@ -65,4 +65,18 @@ impl Segment {
             if normal == 0 { mesh.node(line, k) } else { mesh.node(k, line) }
         })
     }
+
+    /// Cells along the segment, which lies on a side of the mesh and ends on mesh lines, with their
+    /// indices along the side.
+    pub fn cells_at_side<'a>(
+        &self,
+        mesh: &'a Mesh,
+        side: usize,
+    ) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        let (across, along) = mesh.axes(self.normal);
+        let normal = self.normal;
+        let line = if side.is_multiple_of(2) { 0 } else { across.cells() - 1 };
+        let [from, to] = [self.from, self.to].map(|v| along.nearest_line(v));
+        (from..to).map(move |k| (k, mesh.cell_across(normal, line, k)))
+    }
 }

@@ -1,7 +1,9 @@
-//! This module stops particles and dye lines at walls, and lets them leave through open sides.
+//! This module stops particles and dye lines at walls, and lets them leave through openings
+//! in the sides of the domain.
 
 use super::mesh::{Mesh, ON_LINE};
 use super::segment::Segment;
+use super::shape::side_normal;
 
 /// End of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,20 +12,51 @@ pub enum Landing {
     Free([f64; 2]),
     /// A wall stopped the path at this point.
     Held([f64; 2]),
-    /// The path left through an open side.
+    /// The path left through an opening in a side.
     Left,
 }
 
-/// All obstacles of a scene, and the sides through which particles leave.
+/// All obstacles of a scene, and the openings through which particles leave.
 #[derive(Clone, Debug, Default)]
 pub struct Enclosure {
     /// Walls and sides of blocks, in the plan's units.
     pub obstacles: Vec<Segment>,
-    /// Whether each side of the domain is open: left, right, bottom, top.
-    pub open: [bool; 4],
+    /// Ranges of the coordinate along each side of the domain (left, right, bottom, top) in which
+    /// the side is open. A range that reaches the end of a side is infinite there: it lets out what
+    /// leaves across the corner.
+    pub open: [Vec<[f64; 2]>; 4],
 }
 
 impl Enclosure {
+    /// Opens a range of a side.
+    pub fn open_side(&mut self, mesh: &Mesh, side: usize, [from, to]: [f64; 2]) {
+        let (_, along) = mesh.axes(side_normal(side));
+        let low = if from <= along.start() { f64::NEG_INFINITY } else { from };
+        let high = if to >= along.end() { f64::INFINITY } else { to };
+        self.open[side].push([low, high]);
+    }
+
+    /// Whether there is any opening.
+    pub fn is_open(&self) -> bool {
+        self.open.iter().any(|ranges| !ranges.is_empty())
+    }
+
+    /// Whether the straight path from `p0` to `p1`, which crosses the line of a side, leaves the
+    /// domain through an opening before it meets an obstacle.
+    fn lets_out(&self, mesh: &Mesh, side: usize, p0: [f64; 2], p1: [f64; 2]) -> bool {
+        if self.open[side].is_empty() {
+            return false;
+        }
+        let normal = side_normal(side);
+        let (across, along) = mesh.axes(normal);
+        let line = if side.is_multiple_of(2) { across.start() } else { across.end() };
+        let t = ((line - p0[normal]) / (p1[normal] - p0[normal])).clamp(0.0, 1.0);
+        let at = p0[1 - normal] + t * (p1[1 - normal] - p0[1 - normal]);
+        let at = if along.periodic() { along.wrap(at) } else { at };
+        self.open[side].iter().any(|&[from, to]| at >= from && at <= to)
+            && !self.obstacles.iter().any(|w| w.crossing(mesh, p0, p1).is_some_and(|c| c < t))
+    }
+
     /// Follows the straight path from `p0` (inside the mesh) to `p1`. The result is not wrapped
     /// around periodic sides.
     pub fn follow(&self, mesh: &Mesh, p0: [f64; 2], p1: [f64; 2]) -> Landing {
@@ -35,7 +68,7 @@ impl Enclosure {
             }
             let (low, high) = (axis.start(), axis.end());
             if to[c] < low || to[c] > high {
-                if self.open[2 * c + usize::from(to[c] > high)] {
+                if self.lets_out(mesh, 2 * c + usize::from(to[c] > high), p0, p1) {
                     return Landing::Left;
                 }
                 to[c] = to[c].clamp(low, high);
@@ -100,7 +133,7 @@ mod tests {
     fn a_wall_stops_a_path_and_an_aperture_lets_it_through() {
         let e = Enclosure {
             obstacles: vec![Segment { normal: 1, at: 1.0, from: 0.0, to: 1.0 }],
-            open: [false; 4],
+            ..Enclosure::default()
         };
         let m = mesh();
         assert_eq!(e.follow(&m, [0.5, 1.5], [0.6, 0.7]), Landing::Held([0.6, 1.0]));
@@ -124,7 +157,7 @@ mod tests {
                 Segment { normal: 0, at: 1.0, from: 0.0, to: 1.0 },
                 Segment { normal: 1, at: 1.0, from: 0.0, to: 1.0 },
             ],
-            open: [false, true, false, false],
+            open: [vec![], vec![[f64::NEG_INFINITY, f64::INFINITY]], vec![], vec![]],
         };
         let m = mesh();
         let inside = [(1.0 - 2.0 * ON_LINE).next_down(); 2];

@@ -4,15 +4,24 @@ use super::gauges::SiGauge;
 use super::values::{Result, coordinate};
 use super::walls::Walls;
 use crate::plan::Units;
-use crate::plan::boundary::SIDES;
+use crate::plan::boundary::{SIDES, Side, pieces, place_of};
 use crate::plan::meshing::{Line, Refinement, Sizing};
 use crate::scene::{BoundaryKind, GradingTarget, Scene, SceneError, Scope, WallKind};
 use crate::space::mesh::{Axis, Mesh};
+use crate::space::segment::Segment;
+use crate::space::shape::side_normal;
 
 /// Largest number of cells along a side. More cells need more memory than usual machines have.
 const MAX_CELLS: usize = 4096;
 /// Largest total number of cells; each takes about 10 kB with its share of the factor.
 const MAX_TOTAL_CELLS: usize = 1_000_000;
+
+/// What mesh lines are laid along, in m.
+pub(super) struct Lines<'a> {
+    pub(super) walls: &'a Walls,
+    pub(super) gauges: &'a [SiGauge],
+    pub(super) sides: &'a [Side; 4],
+}
 
 /// Makes the mesh: lines on all required coordinates, graded towards the edges of apertures.
 pub(super) fn mesh(
@@ -20,8 +29,7 @@ pub(super) fn mesh(
     scope: &Scope,
     domain: [[f64; 2]; 2],
     length: f64,
-    walls: &Walls,
-    gauges: &[SiGauge],
+    &Lines { walls, gauges, sides }: &Lines,
     units: &Units,
 ) -> Result<Mesh> {
     if scene.accuracy.cells == 0 {
@@ -61,6 +69,10 @@ pub(super) fn mesh(
         let owner = format!("gauge `{}`", g.name);
         g.segment.lines().into_iter().for_each(|(c, v)| demand(c, v, &owner, false));
     }
+    for (s, piece) in pieces(sides).filter(|(_, piece)| piece.part.is_some()) {
+        let Segment { normal, from, to, .. } = piece.segment;
+        [from, to].into_iter().for_each(|v| demand(1 - normal, v, &place_of(s, piece), false));
+    }
     for (c, list) in [&scene.mesh.lines_x, &scene.mesh.lines_y].into_iter().enumerate() {
         for q in list {
             let v = coordinate(q, c, scope)?;
@@ -74,7 +86,7 @@ pub(super) fn mesh(
             demand(c, v, "mesh", true);
         }
     }
-    let refinements = refinements(scene, scope, domain, walls)?;
+    let refinements = refinements(scene, scope, domain, (walls, sides))?;
     let periodic = periodic(scene)?;
     let mut axes = Vec::new();
     for (c, demanded) in lines.into_iter().enumerate() {
@@ -168,11 +180,12 @@ fn refinements(
     scene: &Scene,
     scope: &Scope,
     domain: [[f64; 2]; 2],
-    walls: &Walls,
+    (walls, sides): (&Walls, &[Side; 4]),
 ) -> Result<[Vec<Refinement>; 2]> {
     let mut out = [vec![], vec![]];
+    let all_lips = || [walls.lips(domain), lips_of_openings(sides)].concat();
     let Some(grading) = &scene.mesh.grading else {
-        for lip in walls.lips(domain) {
+        for lip in all_lips() {
             for c in 0..2 {
                 out[c].push(Refinement { at: lip[c], factor: LIP_FACTOR });
             }
@@ -190,7 +203,7 @@ fn refinements(
         }
         match &g.towards {
             GradingTarget::Apertures => {
-                let lips = walls.lips(domain);
+                let lips = all_lips();
                 let ends = || walls.tips(domain).iter().map(|t| t.at).collect();
                 for tip in if lips.is_empty() { ends() } else { lips } {
                     for c in 0..2 {
@@ -200,11 +213,11 @@ fn refinements(
             }
             GradingTarget::Walls => {
                 for (s, side) in scene.boundaries.sides().into_iter().enumerate() {
-                    let tangential = if s < 2 { &side.velocity_y } else { &side.velocity_x };
-                    if side.kind == BoundaryKind::NoSlip
-                        || tangential.is_some()
-                        || side.rotation.is_some()
-                    {
+                    if side.all_given().any(|given| {
+                        given.kind == BoundaryKind::NoSlip
+                            || given.velocity[1 - side_normal(s)].is_some()
+                            || given.rotation.is_some()
+                    }) {
                         out[s / 2].push(Refinement { at: domain[s / 2][s % 2], factor });
                     }
                 }
@@ -217,6 +230,12 @@ fn refinements(
         }
     }
     Ok(out)
+}
+
+/// Lips of the openings in sides: points where an open piece meets one that is not open.
+fn lips_of_openings(sides: &[Side; 4]) -> Vec<[f64; 2]> {
+    let pairs = sides.iter().flat_map(|side| side.pieces.windows(2));
+    pairs.filter(|p| p[0].open != p[1].open).map(|p| p[0].segment.ends()[1]).collect()
 }
 
 fn periodic(scene: &Scene) -> Result<[bool; 2]> {

@@ -13,13 +13,14 @@ mod recording;
 mod regions;
 mod scales;
 mod schedule;
+mod sides;
 mod time;
 pub(super) mod values;
 pub(super) mod walls;
 
 pub use schedule::resolve;
 
-use super::boundary::{self, SIDES};
+use super::boundary;
 use super::{EffectSet, InitialFields, Method, Plan, Warning};
 use crate::scene::{Field, FieldFn, Scene, SceneError, Scope, is_folder_name};
 use crate::space::shape::side_normal;
@@ -75,18 +76,15 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let walls = Walls::new(scene, scope, domain)?;
     let gauges = gauges::gauges(scene, scope, domain)?;
     gauges::interest(scene)?;
-    let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &walls, &gauges, &units)?);
+    let sides = sides::sides(scene, scope, domain)?;
+    let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides };
+    let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &lines, &units)?);
     state.relaxation = schedule::relaxation(&state, &mesh);
-    let sides = boundary::sides(scene, scope, domain)?;
     let boundary = boundary::boundary(sides, &walls, &mesh, &units, &state)?;
-    let mut enclosure = walls.enclosure(scene, &mesh, &units);
-    for (s, side) in boundary.sides.iter().enumerate() {
-        let through =
-            side.velocity[side_normal(s)].as_ref().is_some_and(|f| f.constant() != Some(0.0));
-        // Particles leave with the outflow.
-        enclosure.open[s] |= through;
-        if through {
-            warnings.push(Warning::ThroughFlow { place: format!("boundaries.{}", SIDES[s]) });
+    let enclosure = walls.enclosure(&boundary, &mesh, &units);
+    for (s, piece) in boundary.pieces() {
+        if piece.conditions.passes_through(side_normal(s)) {
+            warnings.push(Warning::ThroughFlow { place: boundary::place_of(s, piece) });
         }
     }
 
@@ -101,9 +99,9 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         gravity: si.gravity != [0.0; 2] && has_density,
     };
     if !effects.rotation {
-        for (name, side) in SIDES.iter().zip(&boundary.sides) {
-            if side.rotation.is_some() {
-                warnings.push(Warning::RotationUnused { place: format!("boundaries.{name}") });
+        for (s, piece) in boundary.pieces() {
+            if piece.conditions.rotation.is_some() {
+                warnings.push(Warning::RotationUnused { place: boundary::place_of(s, piece) });
             }
         }
     }

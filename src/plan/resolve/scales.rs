@@ -25,14 +25,16 @@ pub(super) fn choose_units(
     let b = &scene.boundaries;
     for (s, side) in b.sides().into_iter().enumerate() {
         let largest = |f: &Field| largest(f, edge(domain, s));
-        for v in [&side.velocity_x, &side.velocity_y].into_iter().flatten() {
-            rate = rate.max(largest(v)? / length);
-        }
-        for t in [&side.traction_x, &side.traction_y].into_iter().flatten() {
-            rate = rate.max(largest(t)? / viscosity);
-        }
-        if let Some(w) = &side.rotation {
-            rate = rate.max(largest(w)?);
+        for given in side.all_given() {
+            for v in given.velocity.into_iter().flatten() {
+                rate = rate.max(largest(v)? / length);
+            }
+            for t in given.traction.into_iter().flatten() {
+                rate = rate.max(largest(t)? / viscosity);
+            }
+            if let Some(w) = given.rotation {
+                rate = rate.max(largest(w)?);
+            }
         }
     }
     if let Some(f) = &scene.body_force {

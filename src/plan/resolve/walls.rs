@@ -2,8 +2,8 @@
 //! edges (lips) of apertures.
 
 use super::values::{Result, point, ranges};
-use crate::plan::Units;
-use crate::scene::{BoundaryKind, Quantity, Scene, SceneError, Scope, WallKind};
+use crate::plan::{BoundaryPlan, Units};
+use crate::scene::{Quantity, Scene, SceneError, Scope, WallKind};
 use crate::space::mesh::Mesh;
 use crate::space::segment::Segment;
 use crate::space::walls::Enclosure;
@@ -136,9 +136,10 @@ impl Walls {
         tips
     }
 
+    /// The walls and blocks, and the open pieces of the sides, as limits of the motion of particles.
     pub(in crate::plan) fn enclosure(
         &self,
-        scene: &Scene,
+        boundary: &BoundaryPlan,
         mesh: &Mesh,
         units: &Units,
     ) -> Enclosure {
@@ -153,8 +154,11 @@ impl Walls {
                 }
             }
         }
-        let open = scene.boundaries.sides().map(|s| s.kind == BoundaryKind::Open);
-        Enclosure { obstacles, open }
+        let mut enclosure = Enclosure { obstacles, ..Enclosure::default() };
+        for (s, piece) in boundary.pieces().filter(|(_, piece)| piece.open) {
+            enclosure.open_side(mesh, s, [piece.segment.from, piece.segment.to]);
+        }
+        enclosure
     }
 }
 
