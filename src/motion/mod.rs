@@ -4,4 +4,5 @@ pub mod advect;
 pub mod cell_velocity;
 pub mod frozen_flow;
 pub mod gauges;
+pub mod inflow;
 pub mod tracers;

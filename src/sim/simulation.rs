@@ -9,6 +9,7 @@ use super::row::Row;
 use crate::motion::advect::Displacements;
 use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
+use crate::motion::inflow::Inflow;
 use crate::motion::tracers::DyeLines;
 use crate::plan::{Matter, Plan, Warning};
 use crate::scene::Quadrature as Rule;
@@ -67,6 +68,8 @@ pub struct Simulation<const D: usize> {
     /// Index of the next scheduled change.
     pub(super) next_change: usize,
     pub(super) population: Population,
+    /// Openings through which the background enters, if there are any.
+    pub(super) inflow: Option<Inflow>,
     pub(super) gauges: Vec<Counter>,
     pub(super) dye: Option<DyeLines>,
     pub(super) count: Count,
@@ -151,6 +154,7 @@ impl<const D: usize> Simulation<D> {
             version: 0,
             next_change: 0,
             population,
+            inflow: Inflow::new(&plan),
             gauges: plan.gauges.iter().cloned().map(Counter::new).collect(),
             dye: plan.tracers.as_ref().map(DyeLines::new),
             count: Count::default(),

@@ -90,6 +90,10 @@ impl<const D: usize> Simulation<D> {
                 &mut self.gauges,
                 &mut self.count,
             );
+            if let Some(inflow) = &self.inflow {
+                let flow = (&*self.half, part);
+                inflow.enter(&plan.mesh, flow, &mut self.particles, &mut self.gauges);
+            }
             if let Some(dye) = &mut self.dye {
                 let phase = Instant::now();
                 dye.advance(&frozen_flow);
@@ -176,7 +180,7 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let mut there = self.particles.clone();
         let parts = self.parts(0.5 * dt);
-        let Simulation { velocities, half, matter, displacements, quadrature, .. } = self;
+        let Simulation { velocities, half, matter, displacements, quadrature, inflow, .. } = self;
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = 0.5 * dt / f64::from(parts);
         let frozen_flow = {
@@ -194,6 +198,9 @@ impl<const D: usize> Simulation<D> {
                 no_gauges,
                 &mut ignored,
             );
+            if let Some(inflow) = inflow {
+                inflow.enter(&plan.mesh, (half, part), &mut there, no_gauges);
+            }
         }
         self.population.control(&plan.mesh, &mut there, &mut ignored);
         seconds.motion += phase.elapsed().as_secs_f64();
