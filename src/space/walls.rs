@@ -164,4 +164,27 @@ mod tests {
         assert_eq!(e.follow(&m, [0.9, 0.8], [1.3, 1.4]), Landing::Held(inside));
         assert_eq!(e.follow(&m, [1.9, 1.8], [2.3, 1.4]), Landing::Left);
     }
+
+    #[test]
+    fn a_side_lets_particles_leave_only_through_its_openings() {
+        let m = mesh();
+        let mut e = Enclosure {
+            obstacles: vec![Segment { normal: 0, at: 1.0, from: 0.0, to: 1.0 }],
+            ..Enclosure::default()
+        };
+        assert!(!e.is_open());
+        e.open_side(&m, 2, [0.5, 1.0]);
+        e.open_side(&m, 3, [1.0, 2.0]);
+        assert!(e.is_open());
+        assert_eq!(e.follow(&m, [0.7, 0.1], [0.8, -0.1]), Landing::Left);
+        assert_eq!(e.follow(&m, [0.3, 0.1], [0.4, -0.1]), Landing::Held([0.4, 0.0]));
+        // The path leaves where it crosses the side, not where it would end.
+        assert_eq!(e.follow(&m, [0.45, 0.01], [0.65, -0.5]), Landing::Held([0.65, 0.0]));
+        assert_eq!(e.follow(&m, [0.55, 0.01], [0.45, -0.5]), Landing::Left);
+        // A wall inside the domain that ends at the lip stops the path before the opening.
+        assert_eq!(e.follow(&m, [1.1, 0.2], [0.8, -0.1]), Landing::Held([1.0, 0.0]));
+        // The opening at the top reaches the corner.
+        assert_eq!(e.follow(&m, [1.9, 1.9], [2.2, 2.1]), Landing::Left);
+        assert_eq!(e.follow(&m, [0.1, 1.9], [-0.2, 2.1]), Landing::Held([0.0, 2.0]));
+    }
 }

@@ -143,6 +143,59 @@ const FAULTS: &[Fault] = &[
         "",
         &["normal velocities let", "open a side"],
     ),
+    (
+        "bottom.kind = \"free_slip\"",
+        "bottom.parts = [{ from = 0.5, to = 2.5, kind = \"outflow\" }]",
+        "2.5, kind",
+        &["boundaries.bottom.parts[0].to is 2.5, outside the side", "x = 0 to 2"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left.parts = [{ from = 0.75, to = 0.25, kind = \"open\" }]",
+        "0.25, kind",
+        &["boundaries.left.parts[0] has no length: from 0.75 to 0.25", "above `from`"],
+    ),
+    (
+        "bottom.kind = \"free_slip\"",
+        "bottom.parts = [{ from = 1, to = 2, kind = \"open\" }, { from = 0.5, to = 1.5, kind = \"outflow\" }]",
+        "1, to = 2",
+        &[
+            "boundaries.bottom.parts[0] begins at 1, inside boundaries.bottom.parts[1], which reaches \
+             from 0.5 to 1.5",
+            "must not overlap",
+        ],
+    ),
+    (
+        "bottom.kind = \"free_slip\"",
+        "bottom.parts = [{ from = 0.5, to = 1, kind = \"periodic\" }]",
+        "\"periodic\" }",
+        &["boundaries.bottom.parts[0] is periodic, but only whole sides can be", "outflow"],
+    ),
+    (
+        "left.kind = \"free_slip\"\nright.kind = \"free_slip\"",
+        "left = { kind = \"periodic\", parts = [{ from = 0, to = 0.5, kind = \"open\" }] }\n\
+         right.kind = \"periodic\"",
+        "[{ from = 0, to",
+        &["boundaries.left is periodic and has parts", "remove the parts"],
+    ),
+    (
+        "bottom.kind = \"free_slip\"",
+        "bottom.parts = [{ from = 0.5, to = 1 }]",
+        "",
+        &["key `kind` is missing", "boundaries.bottom.parts"],
+    ),
+    (
+        "bottom.kind = \"free_slip\"",
+        "bottom.parts = [{ from = 0.5, to = 1, kind = \"open\", velocity_x = 1, traction_x = 1 }]",
+        "1, traction_x",
+        &["boundaries.bottom.parts[0] gives both velocity_x and traction_x", "give one of them"],
+    ),
+    (
+        "bottom.kind = \"free_slip\"",
+        "bottom.parts = [{ from = 0.51, to = 1, kind = \"open\" }]",
+        "",
+        &["boundaries.bottom.parts[0]", "left_wall", "closer than a cell", "raise accuracy.cells"],
+    ),
     ("cells = 4", "cells = 0", "", &["accuracy.cells is 0", "give 1 or more"]),
     ("cells = 4", "cells = -4", "-4", &["accuracy.cells", "a whole number, 0 or more"]),
     ("cells = 4", "cells = 100000", "", &["cells along x", "lower accuracy.cells"]),

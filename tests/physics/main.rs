@@ -6,6 +6,7 @@ mod effects;
 mod exact;
 mod laws;
 mod measure;
+mod openings;
 mod order;
 mod patch;
 mod rest;
