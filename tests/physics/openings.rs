@@ -118,6 +118,12 @@ fn particles_leave_only_through_the_slit_and_the_background_takes_their_place() 
         assert!((fluid + air - 4.0).abs() < 0.03, "{fluid} {air}");
     }
     let slit = run.row().gauges[0].volume;
+    let plan = run.plan();
+    let air = plan.background().unwrap();
+    let particles = run.particles();
+    let low = |p: &[f64; 2]| p[1] * plan.units.length < 0.3;
+    let mut below = particles.position.iter().zip(&particles.material).filter(|(p, _)| low(p));
+    assert!(below.all(|(_, &m)| m != air), "no air comes in from below");
     assert!(slit > 1.0, "a third of the fluid has left: {slit}");
     assert!(run.count().left > 300);
 }
