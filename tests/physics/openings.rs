@@ -100,7 +100,8 @@ fn what_flows_in_at_the_top_flows_out_of_the_slit() {
 
 #[test]
 fn particles_leave_only_through_the_slit_and_the_background_takes_their_place() {
-    let mut run = scene(SLIT, &["accuracy.cells=6"]);
+    // Later the surface reaches the slit.
+    let mut run = scene(SLIT, &["accuracy.cells=6", "time.end=20"]);
     let area = |run: &dyn Run, m: &str| {
         let plan = run.plan();
         let m = plan.state.materials.iter().position(|k| k.name == m).unwrap();
@@ -124,6 +125,7 @@ fn particles_leave_only_through_the_slit_and_the_background_takes_their_place() 
     let low = |p: &[f64; 2]| p[1] * plan.units.length < 0.3;
     let mut below = particles.position.iter().zip(&particles.material).filter(|(p, _)| low(p));
     assert!(below.all(|(_, &m)| m != air), "no air comes in from below");
+    assert_eq!(run.row().gauges[1].volume, 0.0, "no air passes the slit");
     assert!(slit > 1.0, "a third of the fluid has left: {slit}");
     assert!(run.count().left > 300);
 }
