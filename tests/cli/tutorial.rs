@@ -121,13 +121,18 @@ fn links_of_the_documentation_lead_somewhere() {
         let listed = name == "SUMMARY.md" || summary.contains(&format!("({name})"));
         assert!(listed, "{name} is missing in docs/SUMMARY.md");
     }
-    pages.push(Path::new(ROOT).join("README.md"));
+    for name in ["README.md", "ARCHITECTURE.md", "python/README.md"] {
+        pages.push(Path::new(ROOT).join(name));
+    }
     for page in pages {
         let text = std::fs::read_to_string(&page).expect("a page");
         for link in text.split("](").skip(1).filter_map(|part| part.split(')').next()) {
             if link.contains("://") {
                 continue;
             }
+            // The book has only what is in its folder.
+            let in_book = !page.starts_with(&docs) || !link.contains("..");
+            assert!(in_book, "{}: {link} leads out of the book", page.display());
             let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
             let target = match file {
                 "" => page.clone(),
