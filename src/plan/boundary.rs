@@ -202,7 +202,7 @@ pub(super) fn boundary(
     walls: &Walls,
     mesh: &Mesh,
     units: &Units,
-    state: &Matter,
+    (state, inertia): (&Matter, bool),
 ) -> Result<BoundaryPlan> {
     for piece in sides.iter_mut().flat_map(|side| &mut side.pieces) {
         piece.segment = piece.segment.on_mesh(mesh, units.length);
@@ -227,7 +227,8 @@ pub(super) fn boundary(
         pieces(&sides).any(|(_, p)| p.conditions.velocity[c].is_some())
             || lines.iter().any(|w| w.segment.normal == c || w.no_slip)
     };
-    let free_translation = [!held(0), !held(1)];
+    // Inertia determines the velocity of a body that nothing holds.
+    let free_translation = [0, 1].map(|c| !held(c) && !inertia);
     let compressible = state.materials.iter().any(|m| m.law.compliance > 0.0);
     let closed = !compressible
         && pieces(&sides).all(|(s, p)| p.conditions.velocity[side_normal(s)].is_some());

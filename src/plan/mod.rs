@@ -61,6 +61,8 @@ pub struct Plan {
     pub regions: Vec<Region>,
     /// Initial fields of carried viscosity and density, one entry per material, SI.
     pub initial: Vec<InitialFields>,
+    /// Velocity along x and y at the start, m/s; at rest if absent. Only with inertia.
+    pub initial_velocity: Option<[FieldFn; 2]>,
     /// Force along x and y (N/m3) and couple (N m/m3) per volume, fixed in space, SI.
     pub body_force: Option<[FieldFn; 3]>,
     /// Acceleration along x and y, fixed in space (m/s2), SI; it acts on the density.
@@ -138,6 +140,10 @@ pub struct EffectSet {
     pub volume_change: bool,
     /// Gravity acts on a material with density.
     pub gravity: bool,
+    /// A law depends on the flow: friction, a yield stress or a power law.
+    pub flow_curves: bool,
+    /// Inertia acts on the materials with density.
+    pub inertia: bool,
 }
 
 /// A part of the domain (SI coordinates) and the material that fills it at the start.
@@ -272,6 +278,9 @@ pub struct ClockPlan {
     pub tolerance: f64,
     /// Largest strain of layered material in a step.
     pub strain: f64,
+    /// Whether steps between two such times are equal as long as their limits allow it, so that
+    /// matrices which depend on the step can be kept.
+    pub equal: bool,
     /// Times that a step ends at exactly: frames, changes and the end, in ascending order.
     pub stops: Vec<f64>,
     /// Times of frames, in ascending order.
@@ -311,20 +320,25 @@ impl Plan {
         self.effects.gravity || self.acceleration.is_some()
     }
 
-    /// Whether the potential energy of the particles and the work of loads determine the energy
-    /// balance: gravity acts, not along a periodic axis, no side has an opening, and volumes are constant.
+    /// Whether the density of the materials matters: they have weight or inertia.
+    pub fn has_mass(&self) -> bool {
+        self.has_weight() || self.effects.inertia
+    }
+
+    /// Whether the energy of the particles and the work of loads determine the energy balance:
+    /// gravity or inertia acts, gravity not along a periodic axis, no side has an opening, and volumes are constant.
     pub fn energy_tells(&self) -> bool {
         let (mesh, g) = (&self.mesh, self.state.gravity);
         let along_seam = mesh.x.periodic() && g[0] != 0.0 || mesh.y.periodic() && g[1] != 0.0;
         let constant = !self.enclosure.is_open() && !self.effects.volume_change;
-        self.effects.gravity && constant && !along_seam
+        (self.effects.gravity || self.effects.inertia) && constant && !along_seam
     }
 
-    /// Rule for the integration points of cells. Without weight, [`Quadrature::Sides`] is
+    /// Rule for the integration points of cells. Without weight and inertia, [`Quadrature::Sides`] is
     /// [`Quadrature::Laminate`].
     pub fn rule_of_cells(&self) -> Quadrature {
         match self.method.quadrature {
-            Quadrature::Sides if !self.has_weight() => Quadrature::Laminate,
+            Quadrature::Sides if !self.has_mass() => Quadrature::Laminate,
             rule => rule,
         }
     }

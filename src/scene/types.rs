@@ -24,6 +24,12 @@ pub struct Scene {
     /// Gravitational acceleration along x and y, m/s2.
     #[serde(default = "zero_pair")]
     pub gravity: [Quantity; 2],
+    /// Whether inertia is solved; `false` (default): creeping flow.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub inertia: bool,
+    /// Velocity at the start; only with inertia. Absent: at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial_velocity: Option<InitialVelocity>,
     /// Named numbers that expressions may use; `--set name=value` and the explorer change them.
     #[serde(default)]
     pub parameters: IndexMap<String, Parameter>,
@@ -500,6 +506,18 @@ pub struct Block {
     pub kind: WallKind,
 }
 
+/// Velocity at the start of a scene with inertia. Its part with divergence is removed.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InitialVelocity {
+    /// Velocity along x, m/s; may depend on x and y.
+    #[serde(default = "zero_field")]
+    pub x: Field,
+    /// Velocity along y, m/s; may depend on x and y.
+    #[serde(default = "zero_field")]
+    pub y: Field,
+}
+
 /// Pressure at a point, where the boundaries determine it only up to a constant.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -898,6 +916,9 @@ fn strain_default() -> f64 {
 }
 fn inertial_number_default() -> Quantity {
     Quantity::number(0.279)
+}
+fn is_false(value: &bool) -> bool {
+    !value
 }
 fn yes() -> bool {
     true

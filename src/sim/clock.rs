@@ -113,6 +113,9 @@ pub fn next_step(
         limit(GROWTH * dt, Limiter::Growth);
     }
     let (dt, name) = best;
+    if clock.equal {
+        return equal_step(dt, remaining, previous, name);
+    }
     if dt >= remaining * (1.0 - 1e-9) {
         (remaining, Limiter::Stop)
     } else if dt > 0.5 * remaining {
@@ -121,6 +124,25 @@ pub fn next_step(
     } else {
         (dt, name)
     }
+}
+
+/// Smallest step, in units of its limit, that is kept from one step to the next.
+const KEPT: f64 = 0.8;
+
+/// The longest of equal steps up to a stop that is at most `dt`; the length of the previous step as
+/// long as it fits.
+fn equal_step(dt: f64, remaining: f64, previous: Option<f64>, name: Limiter) -> (f64, Limiter) {
+    let last = |step: f64| if step >= remaining * (1.0 - 1e-9) { Limiter::Stop } else { name };
+    if let Some(kept) =
+        previous.filter(|p| *p <= dt * (1.0 + 1e-9) && *p >= KEPT * dt.min(remaining))
+    {
+        let steps = remaining / kept;
+        if (steps - steps.round()).abs() < 1e-6 {
+            return (kept, last(kept));
+        }
+    }
+    let step = remaining / (remaining / dt * (1.0 - 1e-12)).ceil().max(1.0);
+    (step, last(step))
 }
 
 /// Number of cells refined by grading that count as one crossed cell, up to the size of the largest

@@ -5,6 +5,7 @@ use super::criteria::ACCURATE_ENERGY;
 use super::phases::Phases;
 use super::row::{GaugeRow, Measured, Row};
 use super::simulation::Simulation;
+use super::solution::twice_kinetic;
 use crate::solve::element::{PointShape, rates};
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
@@ -178,17 +179,23 @@ impl<const D: usize> Simulation<D> {
         let dissipated = trapezoid(before.dissipated, before.dissipation, dissipation);
         let work = trapezoid(before.work, self.last_other_power, other);
         let potential_energy = self.potential_energy() * u.energy();
+        let kinetic_energy =
+            0.5 * twice_kinetic(&plan.mesh, &self.terms.inertia, &self.flow) * u.energy();
+        let energy = potential_energy + kinetic_energy;
         if first {
-            self.first_energy = potential_energy;
+            self.first_energy = energy;
         }
-        let lost = self.first_energy - potential_energy + work;
+        let lost = self.first_energy - energy + work;
         // A smaller difference is rounding: the scene is at rest.
-        let scale = dissipated.max(REST * self.first_energy.abs());
+        let mut scale = dissipated.max(REST * self.first_energy.abs());
+        if plan.effects.inertia {
+            scale = scale.max(lost.abs()).max(kinetic_energy);
+        }
         let tells = plan.energy_tells() && scale > 0.0;
         let energy_error = if tells { (lost - dissipated) / scale } else { 0.0 };
         if tells && !first {
             let of_step = [
-                before.potential_energy - potential_energy + work - before.work,
+                before.potential_energy + before.kinetic_energy - energy + work - before.work,
                 dissipated - before.dissipated,
             ];
             for (recent, now) in self.recent_energy.iter_mut().zip(of_step) {
@@ -221,6 +228,8 @@ impl<const D: usize> Simulation<D> {
             dt: dt_si,
             limiter,
             iterations,
+            nonlinear: r.iterations,
+            kinetic_energy,
             max_speed: self.flow.max_speed() * u.velocity(),
             rms_speed: self.flow.rms_speed(&plan.mesh) * u.velocity(),
             volume_error: self.volume_error(),

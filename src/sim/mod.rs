@@ -6,6 +6,7 @@
 //! advect particles, dye        Runge-Kutta in the frozen field, with walls and gauges
 //! rotate directors             exact solution for the velocity gradient of the step
 //! resample particles           keeps the number of particles per cell within bounds
+//! momentum                     velocities of the material in the last two steps; with inertia
 //! integration points           fractions, interface and fields from the particles of each cell
 //! weight, restoring loads      density of each cell; implicit terms for stable stratification
 //! solve                        velocity, rotation, pressure
@@ -17,6 +18,7 @@ mod error;
 mod examine;
 mod fault;
 pub mod guard;
+pub mod inertia;
 pub mod initial;
 mod interest;
 mod measure;

@@ -222,6 +222,10 @@ pub struct Measured<'a> {
     pub limiter: Limiter,
     /// Number of solver corrections, summed over the solutions of the step.
     pub iterations: u32,
+    /// Number of iterations of the flow curves of the last solution.
+    pub nonlinear: u32,
+    /// Kinetic energy, J/m.
+    pub kinetic_energy: f64,
     /// Largest speed, m/s.
     pub max_speed: f64,
     /// Root mean square speed, m/s.
@@ -340,6 +344,11 @@ columns! {
     };
     /// Number of solver corrections, summed over the solutions of the step.
     iterations: u32 = |m| m.iterations, 0, { label: "iterations" };
+    /// Number of iterations for friction, yield stresses and power laws, in the solution at the end of
+    /// the step.
+    nonlinear_iterations: u32 = |m| m.nonlinear, 0, {
+        label: "nonlinear iterations", exists: |p| p.effects.flow_curves,
+    };
     /// Number of particles.
     particles: usize = |m| m.particles.len(), 0, { label: "particles", rank: Rank::Value(11) };
     /// Largest speed at a node.
@@ -360,6 +369,11 @@ columns! {
     potential_energy: f64 = |m| m.potential_energy, 0.0, {
         symbol: "E_p", unit: "J/m", label: "potential energy", rank: Rank::Compared(7),
     };
+    /// Kinetic energy.
+    kinetic_energy: f64 = |m| m.kinetic_energy, 0.0, {
+        symbol: "E_k", unit: "J/m", label: "kinetic energy", rank: Rank::Compared(7),
+        exists: |p| p.effects.inertia,
+    };
     /// Time integral of the power of all loads except gravity, plus the change of potential energy
     /// by scheduled changes.
     work: f64 = |m| m.work, 0.0, {
@@ -369,9 +383,9 @@ columns! {
     dissipated: f64 = |m| m.dissipated, 0.0, {
         unit: "J/m", label: "dissipated energy", rank: Rank::Compared(6),
     };
-    /// Potential energy lost since the start plus work minus dissipated energy, over the dissipated
-    /// energy; 0 at rest, and where the potential energy of the particles does not determine the
-    /// balance.
+    /// Potential and kinetic energy lost since the start plus work minus dissipated energy, over the dissipated
+    /// energy; with inertia, over the largest of the dissipated, the lost and the kinetic energy. 0 at
+    /// rest, and where the energy of the particles does not determine the balance.
     energy_error: f64 = |m| m.energy_error, 0.0, {
         label: "energy error", format: Format::Exponent, path: "diagnostics/energy_error",
         panel: Some(Panel::Balances), live: true,

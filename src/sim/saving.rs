@@ -1,6 +1,7 @@
 //! This module saves a simulation in a [`State`] and restores it.
 
 use super::clock::Limiter;
+use super::inertia::Past;
 use super::row::{self, COLUMNS, GaugeRow, Row};
 use super::simulation::{Before, Simulation};
 use super::state::{State, StateError, flat, load_phases, save_phases, wrong_length};
@@ -176,6 +177,21 @@ impl<const D: usize> Simulation<D> {
         } else {
             names.iter().for_each(|name| s.remove(name));
         }
+        let names = ["inertia.velocity", "inertia.half", "inertia.step", "inertia.parts"];
+        if let Some(Past { velocity, half, dt, parts }) =
+            self.inertia.as_ref().and_then(|i| i.past[0].as_ref())
+        {
+            s.put_floats(names[0], flat(velocity));
+            s.put_floats(names[1], flat(half));
+            s.put_floats(names[2], [*dt]);
+            s.put_counts(names[3], [u64::from(*parts)]);
+        } else {
+            names.iter().for_each(|name| s.remove(name));
+        }
+        match self.inertia.as_ref().and_then(|i| i.acceleration.as_ref()) {
+            Some(a) => s.put_floats("inertia.acceleration", flat(a)),
+            None => s.remove("inertia.acceleration"),
+        }
         // The integration points follow from these factors, and the current factors from the
         // points.
         s.put_floats("quadrature.factors", self.factors_of_points.iter().copied());
@@ -218,6 +234,23 @@ impl<const D: usize> Simulation<D> {
                 Some(Before { flow: Flow { velocity, pressure }, dt })
             }
         };
+        let past = match s.try_floats("inertia.velocity") {
+            None => None,
+            Some(_) => {
+                let velocity = s.tuples("inertia.velocity", mesh.nodes())?;
+                let half = s.tuples("inertia.half", mesh.nodes())?;
+                let ([dt], [parts]) = (s.numbers("inertia.step")?, s.tally("inertia.parts")?);
+                let parts = u32::try_from(parts).map_err(|_| StateError::Range {
+                    name: "inertia.parts",
+                    value: parts.to_string(),
+                })?;
+                Some(Past { velocity, half, dt, parts })
+            }
+        };
+        let acceleration = match s.try_floats("inertia.acceleration") {
+            Some(_) => Some(s.tuples("inertia.acceleration", mesh.nodes())?),
+            None => None,
+        };
         let factors = s.exactly("quadrature.factors", materials)?;
         let gauges = s.exactly("gauges", self.gauges.len())?;
         let refilled = s.exactly("gauges.refilled", self.gauges.len())?;
@@ -251,6 +284,9 @@ impl<const D: usize> Simulation<D> {
         self.particles = particles;
         self.flow = flow;
         self.previous = previous;
+        if let Some(inertia) = &mut self.inertia {
+            (inertia.past, inertia.acceleration) = ([past, None], acceleration);
+        }
         for ((gauge, &volume), &refilled) in self.gauges.iter_mut().zip(gauges).zip(refilled) {
             (gauge.volume, gauge.refilled) = (volume, refilled);
         }

@@ -2,6 +2,7 @@
 
 use super::clock::{self, Limiter};
 use super::error::SimError;
+use super::inertia::Inertia;
 use super::initial;
 use super::interest::Interest;
 use super::phases::Phases;
@@ -58,6 +59,10 @@ pub struct Simulation<const D: usize> {
     pub(super) fixed_load: Vec<[f64; D]>,
     /// Nodal forces of the current solution.
     pub(super) load: Vec<[f64; D]>,
+    /// Momentum of the last steps, if inertia is solved.
+    pub(super) inertia: Option<Inertia>,
+    /// Nodal forces of the momentum of the last steps; empty without inertia.
+    pub(super) momentum: Vec<[f64; 2]>,
     /// Nodal forces without gravity.
     pub(super) other_load: Vec<[f64; D]>,
     /// Current materials and gravity.
@@ -149,6 +154,8 @@ impl<const D: usize> Simulation<D> {
             half: Vec::new(),
             load: fixed_load.clone(),
             other_load: fixed_load.clone(),
+            inertia: plan.effects.inertia.then(|| Inertia::new(&plan)),
+            momentum: vec![],
             fixed_load,
             matter: plan.state.clone(),
             version: 0,
@@ -177,7 +184,14 @@ impl<const D: usize> Simulation<D> {
         };
         sim.apply_changes();
         let mut seconds = Phases::default();
+        sim.start_moving(&mut seconds)?;
         sim.solve(None, &mut seconds)?;
+        if let Some(inertia) = &mut sim.inertia {
+            inertia.begin(&sim.plan, |node| {
+                let u = sim.flow.velocity[node];
+                [u[0], u[1]]
+            });
+        }
         sim.baseline = (0..sim.matter.materials.len()).map(|m| sim.projected_share(m)).collect();
         sim.notes = sim.initial_notes(empty);
         sim.measure(0.0, Limiter::Start, seconds, sim.report.corrections, clock);

@@ -3,6 +3,7 @@
 
 use super::Integrator;
 use super::error::SimError;
+use super::inertia::Past;
 use super::phases::Phases;
 use super::simulation::Simulation;
 use crate::plan::material::Material;
@@ -10,11 +11,16 @@ use crate::solve::last_flow::{Iterate, LastFlow, NoFlow};
 use crate::solve::nonlinear;
 use crate::solve::report::{SolveError, Stopping};
 use crate::solve::stokes::Loads;
+use crate::solve::terms::inertia::Inertia;
 use crate::solve::terms::restoring::Ahead;
 use crate::solve::terms::weight::{Masses, add_acceleration, add_gravity};
 use crate::space::flow::Flow;
+use crate::space::mesh::Mesh;
+use crate::threads;
 use std::time::Instant;
 
+/// Length of the step from rest to the first flow with inertia, in units of time or of the run.
+const IMPULSE: f64 = 1e-6;
 /// Tolerance of the flows of the softer materials from which a first flow starts.
 const ROUGH: f64 = 0.1;
 /// Factor between their largest viscosities.
@@ -44,6 +50,21 @@ fn softer(materials: &[Material]) -> Vec<Vec<Material>> {
         out.push(stage);
         factor *= STAGE;
     }
+}
+
+/// Twice the kinetic energy, `integral rho u . u`.
+pub(super) fn twice_kinetic<const D: usize>(mesh: &Mesh, inertia: &Inertia, flow: &Flow<D>) -> f64 {
+    if inertia.mass.is_empty() {
+        return 0.0;
+    }
+    let [sum] = threads::sum(0..mesh.cells(), |cell| {
+        if mesh.solid[cell] {
+            return [0.0];
+        }
+        let nodal = mesh.cell_nodes(cell).map(|n| flow.velocity[n]);
+        [inertia.square(cell, &nodal.map(|u| [u[0], u[1]]))]
+    });
+    sum
 }
 
 impl<const D: usize> Simulation<D> {
@@ -77,6 +98,7 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         self.update_load();
         self.update_restoring(restoring);
+        self.update_inertia();
         seconds.weight += phase.elapsed().as_secs_f64();
         let stopping = Stopping::of(&plan.method);
         let loads = Loads { nodal: &self.load, terms: &self.terms };
@@ -102,6 +124,7 @@ impl<const D: usize> Simulation<D> {
             self.report.iterations += iterations;
             self.report.corrections += corrections;
         }
+        self.separate_inertia();
         seconds.assemble += self.report.seconds.assemble;
         seconds.factor += self.report.seconds.factor;
         seconds.solve += self.report.seconds.solve;
@@ -123,9 +146,73 @@ impl<const D: usize> Simulation<D> {
         self.terms.restoring.update(mesh, &self.restoring_faces, &self.density, ahead, before);
     }
 
+    /// With inertia, finds the first flow: the initial velocity without its divergence.
+    ///
+    /// The first flow is that after a step so short that only inertia and pressure act in it. If
+    /// material moves, it is solved for twice, so that the pressure is that of the flow and not that
+    /// of the impulse that removes the divergence.
+    pub(super) fn start_moving(&mut self, seconds: &mut Phases) -> Result<(), SimError> {
+        let plan = self.plan.clone();
+        let Some(inertia) = &mut self.inertia else { return Ok(()) };
+        let mesh = &plan.mesh;
+        let mut velocity = vec![[0.0; 2]; mesh.nodes()];
+        if let Some(given) = &plan.initial_velocity {
+            for (node, u) in velocity.iter_mut().enumerate() {
+                let [x, y] = plan.si(mesh.node_position(node));
+                *u = given.each_ref().map(|f| f.at(x, y) / plan.units.velocity());
+            }
+        }
+        let half = vec![[0.0; 2]; mesh.nodes()];
+        let dt = IMPULSE * plan.clock.end.min(1.0);
+        inertia.enter(Past { velocity, half, dt, parts: 1 });
+        if plan.initial_velocity.is_some() {
+            self.solve(None, seconds)?;
+            let mut velocity = Vec::new();
+            self.flow.translation(&mut velocity);
+            self.flow.pressure.fill([0.0; 3]);
+            let past = Past { half: velocity.clone(), velocity, dt, parts: 1 };
+            if let Some(inertia) = &mut self.inertia {
+                inertia.past = [Some(past), None];
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the momentum of the last steps to the load.
+    fn update_inertia(&mut self) {
+        let plan = self.plan.clone();
+        let Simulation { inertia, density, terms, momentum, load, .. } = self;
+        let Some(inertia) = inertia else { return };
+        inertia.update(&plan, density, &mut terms.inertia, momentum);
+        for (load, momentum) in load.iter_mut().zip(momentum) {
+            load[0] += momentum[0];
+            load[1] += momentum[1];
+        }
+    }
+
+    /// Separates the power of the inertia from those of the loads and of the stabilisation in the
+    /// report, and the momentum from the load.
+    fn separate_inertia(&mut self) {
+        let Simulation { inertia, terms, momentum, load, flow, plan, report, .. } = self;
+        if inertia.is_none() {
+            return;
+        }
+        let nodes = load.iter_mut().zip(momentum).zip(&flow.velocity);
+        let mut power = 0.0;
+        for ((load, momentum), u) in nodes {
+            load[0] -= momentum[0];
+            load[1] -= momentum[1];
+            power += momentum[0] * u[0] + momentum[1] * u[1];
+        }
+        let taken = terms.inertia.rate * twice_kinetic(&plan.mesh, &terms.inertia, flow);
+        report.power_in -= power;
+        report.restoring -= taken;
+        report.inertia = taken - power;
+    }
+
     fn update_load(&mut self) {
         let plan = self.plan.clone();
-        if !plan.has_weight() {
+        if !plan.has_mass() {
             return;
         }
         self.load.copy_from_slice(&self.fixed_load);

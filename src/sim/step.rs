@@ -3,6 +3,7 @@
 use super::Integrator;
 use super::clock::{Limiter, next_step};
 use super::error::SimError;
+use super::inertia::Past;
 use super::phases::Phases;
 use super::simulation::{Before, Simulation};
 use crate::motion::advect;
@@ -25,6 +26,13 @@ const FIRST_ATTEMPTS: u32 = 3;
 const LARGEST_RISE: f64 = 1.25;
 /// See [`LARGEST_RISE`].
 const LARGEST_FALL: f64 = 0.5;
+
+/// A step of length `dt` in a number of parts from a flow, with the velocity `half` at its middle.
+fn past<const D: usize>(flow: &Flow<D>, half: &[[f64; 2]], dt: f64, parts: u32) -> Past {
+    let mut velocity = Vec::with_capacity(half.len());
+    flow.translation(&mut velocity);
+    Past { velocity, half: half.to_vec(), dt, parts }
+}
 
 impl<const D: usize> Simulation<D> {
     /// Takes one step.
@@ -73,9 +81,12 @@ impl<const D: usize> Simulation<D> {
         let phase = Instant::now();
         let plan = self.plan.clone();
         let parts = self.parts(dt);
-        let Simulation { velocities, half, matter, quadrature, .. } = self;
+        let Simulation { velocities, half, matter, quadrature, inertia, .. } = self;
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = dt / f64::from(parts);
+        if let Some(inertia) = inertia {
+            inertia.enter(past(&self.flow, half, dt, parts));
+        }
         let frozen_flow = {
             let kinks = quadrature.kinks();
             FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, &kinks, part)
@@ -117,6 +128,9 @@ impl<const D: usize> Simulation<D> {
         let ahead = (!changed).then(|| self.ahead(self.expected_step(dt)));
         if let (Some(previous), false) = (&self.previous, changed) {
             self.flow.extrapolate(&previous.flow, dt / previous.dt);
+        }
+        if let (Some(inertia), true) = (&mut self.inertia, changed) {
+            inertia.past[1] = None;
         }
         let solved = self.solve(ahead.flatten().map(|t| (t, &before)), &mut seconds);
         // The step after a sudden change is chosen as the first one.
@@ -206,12 +220,20 @@ impl<const D: usize> Simulation<D> {
         seconds.motion += phase.elapsed().as_secs_f64();
         let here = std::mem::replace(&mut self.particles, there);
         let flow = self.flow.clone();
+        // To the middle of the step, the first order in time suffices.
+        let steps = self.inertia.as_mut().map(|inertia| {
+            let only = past(&flow, &self.half, 0.5 * dt, parts);
+            std::mem::replace(&mut inertia.past, [Some(only), None])
+        });
         // In the first step a mode may at most change its sign. With exactly half a step ahead, the
         // method is the trapezoidal rule.
         let ahead = self.ahead(dt).map(|t| if self.previous.is_none() { 0.5 * dt } else { t });
         let solved = self.solve(ahead.map(|t| (t, &flow)), seconds);
         std::mem::replace(&mut self.flow, flow).translation(&mut self.half);
         self.particles = here;
+        if let (Some(inertia), Some(steps)) = (&mut self.inertia, steps) {
+            inertia.past = steps;
+        }
         solved?;
         Ok(self.report.corrections)
     }

@@ -33,7 +33,8 @@ use crate::space::fit::{Degree, Fit, Polynomial};
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
-use crate::space::shape::{GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
+use crate::space::shape::{GAUSS_3, GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
+use std::sync::LazyLock;
 
 /// Weight per volume of a neighbour's particle in a fit, relative to the cell's own particles, by
 /// its reference coordinates.
@@ -81,6 +82,21 @@ pub struct MassPoint<'a> {
     /// Values of the shape functions.
     pub n: &'a [f64; NODES],
 }
+
+/// Values at the points of [`GAUSS_6X6`] of the Lagrange polynomials of the points of
+/// [`GAUSS_3X3`].
+static FROM_GAUSS: LazyLock<[[f64; 9]; SUBPOINTS]> = LazyLock::new(|| {
+    let along = |t: f64| -> [f64; 3] {
+        std::array::from_fn(|i| {
+            let others = (0..3).filter(|&k| k != i);
+            others.map(|k| (t - GAUSS_3[k]) / (GAUSS_3[i] - GAUSS_3[k])).product()
+        })
+    };
+    std::array::from_fn(|q| {
+        let [x, y] = GAUSS_6X6[q].r.map(along);
+        std::array::from_fn(|g| x[g % 3] * y[g / 3])
+    })
+});
 
 impl Density {
     /// Creates zero densities for all cells.
@@ -158,6 +174,18 @@ impl Density {
             for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
                 f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
             }
+        }
+    }
+
+    /// Calls `f` for each of the points of [`GAUSS_6X6`]. Integrals of polynomials are those of
+    /// [`Density::for_points`].
+    pub fn for_fine_points(&self, cell: usize, mut f: impl FnMut(MassPoint)) {
+        if self.of_sides[cell].is_some() {
+            return self.for_points(cell, f);
+        }
+        for (g, at_gauss) in GAUSS_6X6.iter().zip(FROM_GAUSS.iter()) {
+            let density: f64 = at_gauss.iter().zip(&self.at_gauss[cell]).map(|(l, d)| l * d).sum();
+            f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
         }
     }
 

@@ -43,6 +43,8 @@ pub struct Matrices<const D: usize> {
     pub rotation: Vec<Option<Box<RotationModes>>>,
     /// Content that the matrix of each cell was computed for.
     built_from: Vec<Content>,
+    /// [`Terms::stamp`] that the matrices were computed with.
+    stamp: u64,
     /// Matrices computed in the last update, in ascending order of the cells.
     fresh: Vec<Fresh<D>>,
 }
@@ -88,6 +90,7 @@ impl<const D: usize> Matrices<D> {
             blocks: vec![Self::NO_BLOCKS; cells],
             rotation: (0..cells).map(|_| None).collect(),
             built_from: vec![Content::Unknown; cells],
+            stamp: 0,
             fresh: vec![],
         }
     }
@@ -96,6 +99,10 @@ impl<const D: usize> Matrices<D> {
     /// whose blocks differ in any bit from the previous ones.
     pub fn update(&mut self, from: Ingredients<D>, mut changed: impl FnMut(usize)) {
         self.fresh.clear();
+        if self.stamp != from.terms.stamp() {
+            self.stamp = from.terms.stamp();
+            self.built_from.fill(Content::Unknown);
+        }
         // Terms on faces are not part of the content: cells with such a term are always computed.
         let faces = || from.terms.on_faces().flat_map(|t| t.faces());
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
@@ -179,7 +186,9 @@ impl<const D: usize> Fresh<D> {
             }
         }
         let mass = measure.pressure_mass();
-        let viscosity = quadrature.mean_viscosity[cell] + if D == 3 { turning } else { 0.0 };
+        let viscosity = quadrature.mean_viscosity[cell]
+            + if D == 3 { turning } else { 0.0 }
+            + terms.inertia.resistance(cell, measure.volume(), size[0].max(size[1]));
         let compliance = 1.0 / (PENALTY * viscosity) + quadrature.compliance[cell];
         self.matrix.penalty = mass.map(|m| 1.0 / (m * compliance));
         for a in 0..NODES {

@@ -50,6 +50,8 @@ pub struct Report {
     pub dissipation: f64,
     /// Numerical power that the terms of [`restoring`](super::terms::restoring) take from the flow.
     pub restoring: f64,
+    /// Power that goes into kinetic energy; zero without inertia.
+    pub inertia: f64,
     /// Scale of the rounding errors of powers: the sum of `||f||^2_{1/D}`, the power of the loads
     /// on a mesh of one element; of `integral p^2/eta`, the power of the pressure if it strained
     /// the stiffest fluid; and of a small share of `||sqrt(D) u||^2`.
@@ -64,9 +66,15 @@ impl Report {
     /// Imbalance of the powers relative to the largest of them, or to a millionth of the power
     /// scale if that is larger.
     pub fn power_error(&self) -> f64 {
-        let larger = [self.power_in, self.dissipation, self.restoring, REST * self.power_scale];
+        let larger = [
+            self.power_in,
+            self.dissipation,
+            self.restoring,
+            self.inertia,
+            REST * self.power_scale,
+        ];
         let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));
-        let difference = (self.power_in - self.dissipation - self.restoring).abs();
+        let difference = (self.power_in - self.dissipation - self.restoring - self.inertia).abs();
         if larger > 0.0 { difference / larger } else { 0.0 }
     }
 }

@@ -79,8 +79,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let sides = sides::sides(scene, scope, domain)?;
     let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides };
     let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &lines, &units)?);
-    state.relaxation = schedule::relaxation(&state, &mesh);
-    let boundary = boundary::boundary(sides, &walls, &mesh, &units, &state)?;
+    state.relaxation = schedule::relaxation(&state, &mesh, schedule::inertial(scene, &units));
+    let boundary = boundary::boundary(sides, &walls, &mesh, &units, (&state, scene.inertia))?;
     let enclosure = walls.enclosure(&boundary, &mesh, &units);
     for (s, piece) in boundary.pieces() {
         if piece.conditions.passes_through(side_normal(s)) {
@@ -97,6 +97,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         carried_density: si.materials.iter().any(|m| m.density_field.is_some()),
         volume_change: si.materials.iter().any(|m| m.compliance > 0.0),
         gravity: si.gravity != [0.0; 2] && has_density,
+        flow_curves: si.materials.iter().any(|m| m.curve.is_some()),
+        inertia: scene.inertia && has_density,
     };
     if !effects.rotation {
         for (s, piece) in boundary.pieces() {
@@ -108,7 +110,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let density = si.materials.iter().map(|m| m.density).fold(0.0, f64::max);
     let viscosity = si.materials.iter().map(|m| m.viscosity).fold(0.0, f64::max);
     let reynolds = density / units.time * length * length / viscosity;
-    if reynolds > 1.0 {
+    if reynolds > 1.0 && !scene.inertia {
         warnings.push(Warning::Inertia { reynolds });
     }
     if effects.gravity {
@@ -142,6 +144,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
 
     let pressure_reference =
         pressure::reference(scene, scope, (&mesh, &units), (&boundary, &regions))?;
+    let initial_velocity = initial_velocity(scene, scope, domain)?;
     let initial = si
         .materials
         .iter()
@@ -163,6 +166,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         changes: vec![],
         regions,
         initial,
+        initial_velocity,
         body_force,
         acceleration,
         gauges,
@@ -170,7 +174,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         marks,
         method: Method {
             stabilisation: Some(scene.accuracy.stabilisation)
-                .filter(|&share| share > 0.0 && effects.gravity),
+                .filter(|&share| share > 0.0 && effects.gravity && !effects.inertia),
             ..accuracy::method(scene)?
         },
         clock: time::clock(scene, scope, &units)?,
@@ -179,4 +183,26 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         warnings,
         mesh,
     })
+}
+
+/// Velocity at the start, as functions of SI coordinates.
+fn initial_velocity(
+    scene: &Scene,
+    scope: &Scope,
+    domain: [[f64; 2]; 2],
+) -> Result<Option<[FieldFn; 2]>> {
+    let Some(v) = &scene.initial_velocity else { return Ok(None) };
+    if !scene.inertia {
+        return Err(SceneError::at(
+            &v.x,
+            "initial_velocity is given, but a flow without inertia has no memory of it",
+            "set `inertia = true`, or remove it",
+        ));
+    }
+    let compile = |f: &Field| -> Result<FieldFn> {
+        let compiled = f.compile(scope)?;
+        finite_range(f, &compiled, domain, "initial_velocity")?;
+        Ok(compiled)
+    };
+    Ok(Some([compile(&v.x)?, compile(&v.y)?]))
 }

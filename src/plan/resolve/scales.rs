@@ -14,9 +14,13 @@ pub(super) fn choose_units(
     domain: [[f64; 2]; 2],
     length: f64,
 ) -> Result<Units> {
-    let viscosity = si.materials.iter().map(|m| m.viscosity).fold(0.0, f64::max);
+    let mut viscosity = si.materials.iter().map(|m| m.viscosity).fold(0.0, f64::max);
     let density = si.materials.iter().map(|m| m.density).fold(0.0, f64::max);
     let gravity = si.gravity[0].hypot(si.gravity[1]);
+    if scene.inertia {
+        // The velocity of free fall, if viscosity does not slow it.
+        viscosity = viscosity.max(density * (gravity * length.powi(3)).sqrt());
+    }
     let mut rate = density * gravity * length / viscosity;
     let largest = |f: &Field, place: [[f64; 2]; 2]| -> Result<f64> {
         let range = finite_range(f, &f.compile(scope)?, place, "this value")?;

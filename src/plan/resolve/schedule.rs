@@ -4,9 +4,9 @@
 use super::materials::SiMatter;
 use super::values::Result;
 use crate::plan::material::Material;
-use crate::plan::{Matter, Plan, PlannedChange, When};
+use crate::plan::{Matter, Plan, PlannedChange, Units, When};
 use crate::scene::{self, Change, Quantity, Scene, SceneError, Scope};
-use crate::space::mesh::Mesh;
+use crate::space::mesh::{Axis, Mesh};
 
 /// Checks a scene and makes its plan.
 pub fn resolve(scene: &Scene) -> Result<Plan> {
@@ -46,7 +46,7 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
             ));
         }
         let mut state = SiMatter::new(&current, &scope)?.matter(&plan.units);
-        state.relaxation = relaxation(&state, &plan.mesh);
+        state.relaxation = relaxation(&state, &plan.mesh, inertial(scene, &plan.units));
         let label =
             change.set.iter().map(|(k, v)| format!("{k} = {v}")).collect::<Vec<_>>().join(", ");
         plan.changes.push(PlannedChange { when, state, label });
@@ -79,9 +79,27 @@ fn follows(before: &[PlannedChange], when: When) -> bool {
 /// particles by an amount proportional to this speed and to the step in relaxation times.
 const RELAXATIONS: f64 = 1e4;
 
-/// Largest time step for a stratification, a multiple of `eta/(rho g L)` with the largest
-/// viscosity; `None` without gravity or with a single density.
-pub(super) fn relaxation(matter: &Matter, mesh: &Mesh) -> Option<f64> {
+/// Largest time step of a stratification with inertia, in units of the inverse frequency of the
+/// shortest waves of a mesh, `sqrt(h/(pi g))`.
+const WAVES: f64 = 1.0;
+
+/// Unit of the acceleration of the weight over that of the inertia, if inertia is solved.
+pub(super) fn inertial(scene: &Scene, units: &Units) -> Option<f64> {
+    scene.inertia.then(|| units.inertial_density() / units.density)
+}
+
+/// Largest time step for a stratification: a multiple of `eta/(rho g L)` with the largest
+/// viscosity, or, with inertia, of the period of the shortest waves; `None` without gravity or with
+/// a single density.
+pub(super) fn relaxation(matter: &Matter, mesh: &Mesh, inertial: Option<f64>) -> Option<f64> {
+    if let Some(unit) = inertial {
+        let smallest =
+            |axis: &Axis| (0..axis.cells()).map(|k| axis.size(k)).fold(f64::INFINITY, f64::min);
+        let h = smallest(&mesh.x).max(smallest(&mesh.y));
+        let g = matter.gravity[0].hypot(matter.gravity[1]) * unit;
+        return (g > 0.0 && matter.is_stratified())
+            .then(|| WAVES * (h / (std::f64::consts::PI * g)).sqrt());
+    }
     let largest = |f: fn(&Material) -> f64| matter.materials.iter().map(f).fold(0.0, f64::max);
     let extent = (mesh.x.end() - mesh.x.start()).max(mesh.y.end() - mesh.y.start());
     let weight = largest(|m| m.density) * matter.gravity[0].hypot(matter.gravity[1]) * extent;

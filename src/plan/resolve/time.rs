@@ -68,6 +68,7 @@ pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<Clock
         courant: t.courant,
         tolerance: t.tolerance,
         strain: t.strain,
+        equal: scene.inertia,
         stops,
         frames,
     })

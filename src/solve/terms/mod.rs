@@ -7,12 +7,14 @@
 //! | coupling beyond the shear viscosity | [`rotation`] | yes | |
 //! | pressure and incompressibility | [`pressure`] | penalty | |
 //! | weight of the materials | [`weight`] | | yes |
+//! | inertia | [`inertia`] | yes | yes |
 //! | restoring force of stable stratification | [`restoring`] | yes | yes |
 //! | body forces and tractions fixed in space | [`plan::loads`](crate::plan::loads) | | yes |
 //!
 //! The first three exist in every cell and are called by name. [`Terms`] lists the terms that only
 //! some scenes have.
 
+pub mod inertia;
 pub mod pressure;
 pub mod restoring;
 pub mod rotation;
@@ -21,6 +23,7 @@ pub mod weight;
 
 use crate::plan::Plan;
 use crate::space::shape::NODES;
+use inertia::Inertia;
 use restoring::Restoring;
 
 /// A symmetric positive term on whole cells that acts on velocities.
@@ -69,6 +72,8 @@ pub trait FaceTerm: Send + Sync {
 pub struct Terms {
     /// Restoring force of stable stratification at large steps.
     pub restoring: Restoring,
+    /// Inertia of the materials.
+    pub inertia: Inertia,
     /// Further terms on faces, constant during a run.
     faces: Vec<Box<dyn FaceTerm>>,
 }
@@ -76,12 +81,17 @@ pub struct Terms {
 impl Terms {
     /// The terms that a plan needs.
     pub fn of(_plan: &Plan) -> Self {
-        Terms { restoring: Restoring::default(), faces: vec![] }
+        Terms::default()
     }
 
     /// All terms over cells.
-    pub fn on_cells(&self) -> [&dyn CellTerm; 1] {
-        [&self.restoring]
+    pub fn on_cells(&self) -> [&dyn CellTerm; 2] {
+        [&self.restoring, &self.inertia]
+    }
+
+    /// Number that changes if the terms change in cells whose content is the same.
+    pub fn stamp(&self) -> u64 {
+        self.inertia.rate.to_bits()
     }
 
     /// All terms on faces.
