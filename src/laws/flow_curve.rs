@@ -168,6 +168,14 @@ impl FlowCurve {
         }
     }
 
+    /// Rate at which the material yields: that at which its stress is the largest viscosity times the
+    /// rate. For a power law without yield stress it is approximate.
+    pub fn yield_rate(&self, p: f64) -> f64 {
+        const ITERATIONS: usize = 6;
+        let start = self.stress(1e-3, p).0 / self.largest;
+        (0..ITERATIONS).fold(start, |g, _| self.stress(g, p).0 / self.largest)
+    }
+
     /// Whether the material yields: its viscosity is below the largest.
     pub fn yields(&self, g: f64, p: f64) -> bool {
         self.stress(g, p).0 < self.largest * g

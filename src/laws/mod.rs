@@ -24,7 +24,7 @@ use cosserat::Cosserat;
 use director::Orientation;
 use flow_curve::FlowCurve;
 use point::PointLaw;
-use rates::{Rates, Stress};
+use rates::Rates;
 
 /// Variables on which the law of a material depends. The solver evaluates the law again where one
 /// of them may have changed.
@@ -105,13 +105,26 @@ impl<'a> Here<'a> {
 }
 
 /// Change of the stress with the rates that is due to the change of the viscosity,
-/// `factor e (e . dr)` with `e = U r`, the stress at unit viscosity; see [`flow_curve`].
+/// `slope/g e (e . dr)` with `e = U r`, the stress at unit viscosity; see [`flow_curve`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Softening {
-    /// `eta'/g`, Pa s3; negative if the material softens.
-    pub factor: f64,
-    /// The stress `e` at unit viscosity, 1/s.
-    pub direction: Stress,
+    /// `eta'`, Pa s2; negative if the material softens, zero below the yield rate.
+    pub slope: f64,
+    /// The law `U` at unit viscosity, without the coupling beyond the shear viscosity.
+    pub unit: PointLaw,
+    /// The rates `r`.
+    pub rates: Rates,
+    /// The rate `g`, 1/s.
+    pub rate: f64,
+    /// The yield rate, 1/s.
+    pub yield_rate: f64,
+}
+
+impl Softening {
+    /// The larger of the rate and the yield rate.
+    pub fn effective_rate(&self) -> f64 {
+        self.rate.max(self.yield_rate)
+    }
 }
 
 impl Law {
@@ -142,14 +155,19 @@ impl Law {
         }
     }
 
-    /// Derivative of the stress that [`Law::at`] leaves out; `None` if there is none.
+    /// Derivative of the stress that [`Law::at`] leaves out; `None` if the law does not depend on the
+    /// flow or no flow is known.
     pub fn softening(&self, here: &Here) -> Option<Softening> {
         let (curve, flow) = (self.curve.as_ref()?, here.flow?);
         let unit = self.unit(here.orientation);
         let g = unit.power(&flow.rates).sqrt();
-        let slope = curve.viscosity(g, flow.pressure).slope;
-        let direction = unit.without_excess().stress(&flow.rates, 1.0);
-        (slope != 0.0).then(|| Softening { factor: slope / g, direction })
+        Some(Softening {
+            slope: curve.viscosity(g, flow.pressure).slope,
+            unit: unit.without_excess(),
+            rates: flow.rates,
+            rate: g,
+            yield_rate: curve.yield_rate(flow.pressure),
+        })
     }
 
     /// Rate `g` of a generalised fluid, 1/s.

@@ -22,6 +22,18 @@ pub struct Rates {
     pub kappa: [f64; 2],
 }
 
+impl Stress {
+    /// Power of the stress with the rates `r`.
+    pub fn power(&self, r: &Rates) -> f64 {
+        self.deviator[0] * r.d[0]
+            + self.deviator[1] * r.d[1]
+            + self.mean * r.trace
+            + self.skew * r.relative_spin
+            + self.couple[0] * r.kappa[0]
+            + self.couple[1] * r.kappa[1]
+    }
+}
+
 impl Rates {
     /// Rates of a classical continuum, from the velocity gradient `[[u,x, u,y], [v,x, v,y]]`.
     #[inline(always)]
@@ -34,6 +46,16 @@ impl Rates {
     pub fn cosserat(gradient: [[f64; 2]; 2], w: f64, kappa: [f64; 2]) -> Self {
         let [[_, uy], [vx, _]] = gradient;
         Rates { relative_spin: 0.5 * (vx - uy) - w, kappa, ..Rates::classical(gradient) }
+    }
+
+    /// Adds `f` times other rates.
+    pub fn add_scaled(&mut self, f: f64, o: &Rates) {
+        for c in 0..2 {
+            self.d[c] += f * o.d[c];
+            self.kappa[c] += f * o.kappa[c];
+        }
+        self.trace += f * o.trace;
+        self.relative_spin += f * o.relative_spin;
     }
 
     /// Square of the strain rate, `D:D`, 1/s2.

@@ -19,6 +19,8 @@ use crate::space::mesh::Mesh;
 use crate::threads;
 use std::time::Instant;
 
+/// Number of times that the laws take a new pressure in a step.
+const UPDATES: u32 = 1;
 /// Length of the step from rest to the first flow with inertia, in units of time or of the run.
 const IMPULSE: f64 = 1e-6;
 /// Tolerance of the flows of the softer materials from which a first flow starts.
@@ -109,9 +111,11 @@ impl<const D: usize> Simulation<D> {
             self.report = stokes.solve(quadrature, loads, stopping, flow).map_err(failed)?;
         }
         if nonlinear {
+            // In a step, the pressure is extrapolated from earlier ones.
+            let updates = if known { UPDATES } else { u32::MAX };
             let mut solve = |materials: &[Material], stopping| {
                 let matter = nonlinear::Matter { particles, materials };
-                stokes.solve_nonlinear(quadrature, matter, loads, stopping, flow)
+                stokes.solve_nonlinear(quadrature, matter, loads, (stopping, updates), flow)
             };
             let (mut iterations, mut corrections) = (0, 0);
             for materials in if known { vec![] } else { softer(&matter.materials) } {

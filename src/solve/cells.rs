@@ -1,7 +1,8 @@
 //! This module gives access to the data that the evaluation of a cell fills: integration points,
 //! stiffness of a cut, means and volume fractions.
 
-use super::points::{CutStiffness, IntegrationPoint, Place, SofteningPoint};
+use super::points::{CutStiffness, IntegrationPoint, Place};
+use super::softening::SofteningPoint;
 use crate::laws::Here;
 use crate::plan::material::Material;
 use crate::threads::Divisible;
@@ -57,8 +58,8 @@ impl CellMut<'_> {
         if let Some(last) = self.softening.as_mut().and_then(|list| list.last_mut())
             && last.place == place
         {
-            let e = &mut last.softening.direction;
-            (e.skew, e.couple) = (0.0, [0.0; 2]);
+            let unit = &mut last.softening.unit;
+            (unit.coupling, unit.couple) = (0.0, 0.0);
         }
     }
 }

@@ -164,8 +164,8 @@ impl<const D: usize> Fresh<D> {
         if let Some(cut) = cut {
             add_cut_stiffness(&mut k, cut);
         }
-        for softening in quadrature.softening(cell) {
-            softening.add_stiffness::<D>(&mut k, measure);
+        for (softening, q) in quadrature.softening(cell) {
+            softening.add_stiffness::<D>(q, &mut k, measure);
         }
         // Reuse the memory of the previous modes.
         let before = self.rotation.take();

@@ -17,6 +17,7 @@ pub mod quadrature;
 pub mod report;
 mod residual;
 pub mod sides;
+pub mod softening;
 pub mod stokes;
 pub mod symbolic;
 pub mod terms;

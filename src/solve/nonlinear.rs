@@ -15,7 +15,8 @@
 //! ```text
 //! sqrt(s(0) / dissipation)        (Newton decrement, relative)
 //! ```
-//! is below the tolerance: an estimate of the relative error before that correction. It does not
+//! is below the tolerance (or the first one after the laws have taken the pressure for the last
+//! time): an estimate of the relative error before that correction. It does not
 //! depend on units, on the mesh, or on the contrast of viscosities.
 
 use super::last_flow::Iterate;
@@ -35,10 +36,12 @@ const MOST_ITERATIONS: u32 = 100;
 const MOST_PROBES: u32 = 10;
 /// A step is accepted if the slope of the functional has changed its sign by no more than this
 /// share of its slope at the start.
-const OVERSHOOT: f64 = 0.1;
+const OVERSHOOT: f64 = 1.0;
 /// Relative decrement up to which the laws take the pressure of each iterate. Before, the pressure of
 /// material at rest, whose viscosity is large, is not known.
 const NEAR: f64 = 0.1;
+/// Share of the change of the pressure that the laws take from the second time on.
+const RELAXED: f64 = 0.5;
 /// Divergence, relative to the strain rate, of a converged flow.
 const DIVERGENCE: f64 = 1e-8;
 /// Dissipation below this share of the scale of power is that of a scene at rest.
@@ -54,7 +57,8 @@ pub struct Matter<'a> {
 }
 
 impl<const D: usize> Stokes<D> {
-    /// Solves for the flow of generalised fluids. `flow` holds the initial guess; `quadrature` was
+    /// Solves for the flow of generalised fluids. `most_updates`: largest number of times that the
+    /// laws take the pressure of an iterate. `flow` holds the initial guess; `quadrature` was
     /// updated with the same particles and materials.
     ///
     /// # Errors
@@ -65,13 +69,17 @@ impl<const D: usize> Stokes<D> {
         quadrature: &mut Quadrature,
         matter: Matter,
         loads: Loads<D>,
-        stopping: Stopping,
+        (stopping, most_updates): (Stopping, u32),
         flow: &mut Flow<D>,
     ) -> Result<Report, SolveError> {
         let mut report = Report::default();
         let mut work = std::mem::take(&mut self.work);
-        let outcome =
-            self.newton(quadrature, matter, (loads, stopping), (flow, &mut report, &mut work));
+        let outcome = self.newton(
+            quadrature,
+            matter,
+            (loads, stopping, most_updates),
+            (flow, &mut report, &mut work),
+        );
         self.work = work;
         outcome.map(|()| report)
     }
@@ -80,20 +88,34 @@ impl<const D: usize> Stokes<D> {
         &mut self,
         quadrature: &mut Quadrature,
         matter: Matter,
-        (loads, stopping): (Loads<D>, Stopping),
+        (loads, stopping, most_updates): (Loads<D>, Stopping, u32),
         (flow, report, work): (&mut Flow<D>, &mut Report, &mut Work<D>),
     ) -> Result<(), SolveError> {
         self.constraints.impose(&mut flow.velocity);
         let (mut along, mut pressure) = (Flow::default(), flow.pressure.clone());
         // Whether the last correction was computed with the pressure of its flow.
         let mut current = true;
+        // Share of the last correction that was applied.
+        let mut last = None;
+        let mut updates = 0;
         loop {
             self.constraints.remove_null_space(&self.mesh, flow);
-            let near = report.decrement.is_none_or(|d| d <= NEAR);
+            let near = report.decrement.is_some_and(|d| d <= NEAR) && updates < most_updates;
             if near {
-                pressure.clone_from(&flow.pressure);
+                // The pressure may alternate about the solution; the mean of two iterates does not.
+                let share = if updates == 0 { 1.0 } else { RELAXED };
+                for (law, now) in
+                    pressure.as_flattened_mut().iter_mut().zip(flow.pressure.as_flattened())
+                {
+                    *law += share * (now - *law);
+                }
+                updates += 1;
             }
             self.relax(quadrature, matter, flow, &pressure);
+            match last {
+                None => quadrature.align(),
+                Some(share) => quadrature.turn(share),
+            }
             let clock = Instant::now();
             report.active_rotation = self.assemble(quadrature, loads.terms);
             report.seconds.assemble += clock.elapsed().as_secs_f64();
@@ -122,12 +144,14 @@ impl<const D: usize> Stokes<D> {
             self.correct(quadrature, work);
             (report.corrections, report.iterations) =
                 (report.corrections + 1, report.iterations + 1);
-            current = near;
+            current = near || updates == most_updates;
             let slope = self.slope(work);
             let power = report.dissipation.max(REST * report.power_scale);
             report.decrement = Some((slope.abs() / power).sqrt());
+            quadrature.keep_softening();
             let share =
                 self.search(quadrature, matter, loads, (flow, &pressure, &mut along), work, slope);
+            last = Some(share);
             add_scaled(&mut flow.velocity, share, &work.correction.velocity);
             add_scaled(&mut flow.pressure, share, &work.correction.pressure);
             report.seconds.solve += clock.elapsed().as_secs_f64();

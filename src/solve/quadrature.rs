@@ -24,10 +24,12 @@
 use super::cells::CellsMut;
 use super::evaluate::Evaluation;
 use super::last_flow::LastFlow;
-use super::points::{CutStiffness, IntegrationPoint, SofteningPoint};
+use super::points::{CutStiffness, IntegrationPoint};
 use super::sides::Kinked;
+use super::softening::{self, Directions, SofteningPoint};
 use crate::composition::{Composition, Content, EmptyCell, Kind, SCRATCH};
 use crate::laws::point::PointLaw;
+use crate::laws::rates::Rates;
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
 use crate::space::kink::{Kink, Ramp};
@@ -59,6 +61,10 @@ pub struct Quadrature {
     pub compliance: Vec<f64>,
     /// Derivatives of the viscosities of generalised fluids, by cell; empty if there are none.
     softening: Vec<Vec<SofteningPoint>>,
+    /// Those of the last matrices, while a correction is applied.
+    softening_before: Vec<Vec<SofteningPoint>>,
+    /// Directions of the stresses at these points.
+    directions: Vec<Directions>,
     /// Volume factors of the materials in the last update.
     factors: Vec<f64>,
 }
@@ -89,6 +95,8 @@ impl Quadrature {
             mean_viscosity: vec![0.0; cells],
             compliance: vec![0.0; cells],
             softening: vec![],
+            softening_before: vec![],
+            directions: vec![],
             factors: vec![],
         }
     }
@@ -153,9 +161,31 @@ impl Quadrature {
         self.cut[cell].as_deref()
     }
 
-    /// Derivatives of the viscosities at the points of a cell.
-    pub fn softening(&self, cell: usize) -> &[SofteningPoint] {
-        self.softening.get(cell).map_or(&[], |list| list)
+    /// Derivatives of the viscosities at the points of a cell, with the directions of the stresses.
+    pub fn softening(&self, cell: usize) -> impl Iterator<Item = (&SofteningPoint, &Rates)> {
+        let points = self.softening.get(cell).into_iter().flatten();
+        points.zip(self.directions.get(cell).into_iter().flatten())
+    }
+
+    /// Sets the directions of the stresses to those of the current rates.
+    pub fn align(&mut self) {
+        self.directions.resize_with(self.softening.len(), Vec::new);
+        threads::for_each(&mut self.directions, GRAIN, |cell, directions| {
+            softening::aligned(&self.softening[cell], directions);
+        });
+    }
+
+    /// Keeps the current derivatives for [`Quadrature::turn`].
+    pub fn keep_softening(&mut self) {
+        self.softening_before.clone_from(&self.softening);
+    }
+
+    /// Advances the directions of the stresses after the share `share` of a correction.
+    pub fn turn(&mut self, share: f64) {
+        threads::for_each(&mut self.directions, GRAIN, |cell, directions| {
+            let [before, after] = [&self.softening_before, &self.softening].map(|s| &s[cell]);
+            softening::advance(before, after, share, directions);
+        });
     }
 
     /// Kink of the velocity in a cell, if it has one.

@@ -315,7 +315,8 @@ fn the_derivative_of_a_flow_curve_is_that_of_the_stress_and_is_positive() {
             let flow = Some(LocalFlow { rates: rates_of(&r), pressure });
             let here = Here { flow, ..Here::without_flow(1.0, &orientation) };
             let (point, softening) = (law.at(&here), law.softening(&here).expect("it flows"));
-            let e = softening.direction;
+            let e = softening.unit.stress(&rates_of(&r), 1.0);
+            let factor = softening.slope / softening.rate;
             let e = [e.deviator[0], e.deviator[1], e.mean, e.skew, e.couple[0], e.couple[1]];
             let e = Vector6::from(e);
             let mut tangent = Matrix6::zeros();
@@ -325,7 +326,7 @@ fn the_derivative_of_a_flow_curve_is_that_of_the_stress_and_is_positive() {
                 let s = point.stress(&rates_of(&unit), 1.0);
                 let linear =
                     [s.deviator[0], s.deviator[1], s.mean, s.skew, s.couple[0], s.couple[1]];
-                let column = Vector6::from(linear) + softening.factor * e[k] * e;
+                let column = Vector6::from(linear) + factor * e[k] * e;
                 tangent.set_column(k, &column);
                 let step = 1e-5 * unit;
                 let [low, high] =
