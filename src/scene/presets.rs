@@ -5,7 +5,7 @@ use super::load::parse;
 use super::source::SceneSource;
 
 /// Names and TOML texts of the presets.
-const PRESETS: [(&str, &str); 10] = [
+const PRESETS: [(&str, &str); 15] = [
     ("silo", include_str!("../../presets/silo.toml")),
     ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
     ("couette_cosserat", include_str!("../../presets/couette_cosserat.toml")),
@@ -16,6 +16,11 @@ const PRESETS: [(&str, &str); 10] = [
     ("solcx", include_str!("../../presets/solcx.toml")),
     ("solvi", include_str!("../../presets/solvi.toml")),
     ("layer_stack", include_str!("../../presets/layer_stack.toml")),
+    ("hourglass", include_str!("../../presets/hourglass.toml")),
+    ("clepsydra", include_str!("../../presets/clepsydra.toml")),
+    ("column_collapse", include_str!("../../presets/column_collapse.toml")),
+    ("incline", include_str!("../../presets/incline.toml")),
+    ("bingham_slump", include_str!("../../presets/bingham_slump.toml")),
 ];
 
 /// Names and one-line descriptions of the presets, in display order.

@@ -15,13 +15,13 @@
 //! and refills cannot change it. O. Pironneau, "On the transport-diffusion algorithm", Numer. Math.
 //! 38 (1982) 309.
 
-use crate::motion::frozen_flow::{CellVelocities, FrozenFlow};
+use crate::motion::frozen_flow::{CellVelocities, Displacement, FrozenFlow};
 use crate::plan::Plan;
 use crate::solve::density::Density;
 use crate::solve::terms::inertia::{Inertia as Term, Mass};
 use crate::space::flow::interpolate;
-use crate::space::mesh::Mesh;
-use crate::space::shape::{NODES, Shape};
+use crate::space::mesh::{Axis, Mesh};
+use crate::space::shape::{GAUSS_6X6, NODES, Shape};
 use crate::threads;
 
 /// Largest number of cells per task.
@@ -120,6 +120,8 @@ impl Inertia {
             (None, None) => [1.0, 1.0, 0.0],
         };
         let acceleration = acceleration.as_deref();
+        let densities = plan.state.materials.iter().map(|m| m.density);
+        let least = densities.fold(f64::INFINITY, f64::min);
         let [first, second] = backwards;
         let last_flow = reversed(plan, first, last);
         let before_flow = before.as_ref().map(|b| (b, reversed(plan, second, b)));
@@ -129,9 +131,15 @@ impl Inertia {
                 return;
             }
             let volume = mesh.cell_volume(cell);
+            let from = GAUSS_6X6.each_ref().map(|g| mesh.from_reference(cell, g.r));
+            let mut origins = from.map(|at| (cell, at));
+            last_flow.travel_all(cell, &from, |q, way| origins[q] = end(mesh, &way));
+            let mut origins = origins.into_iter();
             density.for_fine_points(cell, |point| {
-                let from = mesh.from_reference(cell, point.r);
-                let one = trace(&last_flow, last.parts, (cell, from));
+                let Some(mut one) = origins.next() else { return };
+                if last.parts > 1 {
+                    one = trace(&last_flow, last.parts - 1, one);
+                }
                 let mut carried = interpolated(mesh, &last.velocity, one).map(|u| a1 * u);
                 if let Some(acceleration) = acceleration {
                     let a = interpolated(mesh, acceleration, one);
@@ -142,7 +150,8 @@ impl Inertia {
                     let u = interpolated(mesh, &before.velocity, two);
                     carried = [carried[0] - a2 * u[0], carried[1] - a2 * u[1]];
                 }
-                let mass = *unit * volume * point.mass;
+                // Densities that vary linearly in a cut cell may be negative at its corners.
+                let mass = *unit * volume * point.mass.max(point.weight * least);
                 for a in 0..NODES {
                     let share = mass * point.n[a];
                     out.load[a][0] += share * carried[0] / last.dt;
@@ -174,27 +183,25 @@ fn reversed<'a>(plan: &'a Plan, room: &'a mut CellVelocities, step: &Past) -> Fr
     FrozenFlow::new(&plan.mesh, &plan.enclosure, room, &back, &|_, _| None, part)
 }
 
-/// The cell and the position to which a flow carries a point in a number of parts. A path ends
-/// where it enters through a side of the domain.
-fn trace(
-    flow: &FrozenFlow,
-    parts: u32,
-    (mut cell, mut at): (usize, [f64; 2]),
-) -> (usize, [f64; 2]) {
-    let mesh = flow.mesh;
+/// The cell and the position to which a flow carries a point in a number of parts.
+fn trace(flow: &FrozenFlow, parts: u32, mut point: (usize, [f64; 2])) -> (usize, [f64; 2]) {
     for _ in 0..parts {
-        let way = flow.travel(&flow.home(cell), at);
-        if way.left {
-            let inside = |c: usize, axis: &crate::space::mesh::Axis| {
-                if axis.periodic() { way.to[c] } else { way.to[c].clamp(axis.start(), axis.end()) }
-            };
-            at = mesh.wrap([inside(0, &mesh.x), inside(1, &mesh.y)]);
-            return (mesh.locate(at), at);
-        }
-        at = mesh.wrap(way.to);
-        cell = way.cell.unwrap_or_else(|| mesh.locate(at));
+        point = end(flow.mesh, &flow.travel(&flow.home(point.0), point.1));
     }
-    (cell, at)
+    point
+}
+
+/// The cell and the position at the end of a path. A path that leaves the domain ends at its side.
+fn end(mesh: &Mesh, way: &Displacement) -> (usize, [f64; 2]) {
+    if way.left {
+        let inside = |c: usize, axis: &Axis| {
+            if axis.periodic() { way.to[c] } else { way.to[c].clamp(axis.start(), axis.end()) }
+        };
+        let at = mesh.wrap([inside(0, &mesh.x), inside(1, &mesh.y)]);
+        return (mesh.locate(at), at);
+    }
+    let at = mesh.wrap(way.to);
+    (way.cell.unwrap_or_else(|| mesh.locate(at)), at)
 }
 
 /// Nodal values interpolated at a point of a cell.

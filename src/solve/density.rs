@@ -73,6 +73,8 @@ struct SideDensities {
 
 /// An integration point of the weight.
 pub struct MassPoint<'a> {
+    /// Share of the volume of the cell.
+    pub weight: f64,
     /// Mass divided by the volume of the cell.
     pub mass: f64,
     /// The mass times the function `psi` of the kink of the velocity.
@@ -168,11 +170,12 @@ impl Density {
             let densities = sides.density.iter().zip(&sides.kinked);
             for ((density, kinked), g) in densities.zip(GAUSS_6X6.iter()) {
                 let [mass, kinked] = [density, kinked].map(|d| g.weight * d);
-                f(MassPoint { mass, kinked, r: g.r, n: &g.shape.n });
+                f(MassPoint { weight: g.weight, mass, kinked, r: g.r, n: &g.shape.n });
             }
         } else {
             for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
-                f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
+                let (weight, mass) = (g.weight, g.weight * density);
+                f(MassPoint { weight, mass, kinked: 0.0, r: g.r, n: &g.shape.n });
             }
         }
     }
@@ -185,7 +188,8 @@ impl Density {
         }
         for (g, at_gauss) in GAUSS_6X6.iter().zip(FROM_GAUSS.iter()) {
             let density: f64 = at_gauss.iter().zip(&self.at_gauss[cell]).map(|(l, d)| l * d).sum();
-            f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
+            let (weight, mass) = (g.weight, g.weight * density);
+            f(MassPoint { weight, mass, kinked: 0.0, r: g.r, n: &g.shape.n });
         }
     }
 

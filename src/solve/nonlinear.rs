@@ -56,6 +56,13 @@ pub struct Matter<'a> {
     pub materials: &'a [Material],
 }
 
+/// Adds a share of the change from `old` to `new`.
+fn blend(old: &mut [[f64; 3]], share: f64, new: &[[f64; 3]]) {
+    for (old, new) in old.as_flattened_mut().iter_mut().zip(new.as_flattened()) {
+        *old += share * (new - *old);
+    }
+}
+
 impl<const D: usize> Stokes<D> {
     /// Solves for the flow of generalised fluids. `most_updates`: largest number of times that the
     /// laws take the pressure of an iterate. `flow` holds the initial guess; `quadrature` was
@@ -95,36 +102,37 @@ impl<const D: usize> Stokes<D> {
         let (mut along, mut pressure) = (Flow::default(), flow.pressure.clone());
         // Whether the last correction was computed with the pressure of its flow.
         let mut current = true;
-        // Share of the last correction that was applied.
-        let mut last = None;
+        // Share of the last correction that was applied, and whether laws and residual are those of
+        // the flow after it.
+        let mut last: Option<(f64, bool)> = None;
         let mut updates = 0;
         loop {
+            let clock = Instant::now();
             self.constraints.remove_null_space(&self.mesh, flow);
             let near = report.decrement.is_some_and(|d| d <= NEAR) && updates < most_updates;
             if near {
                 // The pressure may alternate about the solution; the mean of two iterates does not.
                 let share = if updates == 0 { 1.0 } else { RELAXED };
-                for (law, now) in
-                    pressure.as_flattened_mut().iter_mut().zip(flow.pressure.as_flattened())
-                {
-                    *law += share * (now - *law);
-                }
+                blend(&mut pressure, share, &flow.pressure);
                 updates += 1;
             }
-            self.relax(quadrature, matter, flow, &pressure);
-            match last {
-                None => quadrature.align(),
-                Some(share) => quadrature.turn(share),
+            if near || last.is_none_or(|(_, evaluated)| !evaluated) {
+                self.relax(quadrature, matter, flow, &pressure);
+                match last {
+                    None => {
+                        quadrature.align();
+                        self.assemble(quadrature, loads.terms);
+                    }
+                    Some((share, _)) => quadrature.turn(share),
+                }
+                self.residual(quadrature, loads, flow, work);
+            } else if let Some((share, _)) = last {
+                quadrature.turn(share);
             }
-            let clock = Instant::now();
-            report.active_rotation = self.assemble(quadrature, loads.terms);
-            report.seconds.assemble += clock.elapsed().as_secs_f64();
-            let clock = Instant::now();
-            self.residual(quadrature, loads, flow, work);
             self.report(&work.residual, loads, flow, report)?;
             let converged = report.decrement.is_some_and(|d| d <= stopping.nonlinear);
+            report.seconds.solve += clock.elapsed().as_secs_f64();
             if converged && current && report.divergence <= DIVERGENCE {
-                report.seconds.solve += clock.elapsed().as_secs_f64();
                 return Ok(());
             }
             if report.iterations == MOST_ITERATIONS {
@@ -136,22 +144,32 @@ impl<const D: usize> Stokes<D> {
                     y,
                 });
             }
-            report.seconds.solve += clock.elapsed().as_secs_f64();
             let clock = Instant::now();
-            self.factor.factorize(&self.matrices.blocks).map_err(|e| self.explain(e))?;
+            if last.is_some() {
+                report.active_rotation = self.assemble(quadrature, loads.terms);
+            }
+            report.seconds.assemble += clock.elapsed().as_secs_f64();
+            let clock = Instant::now();
+            if self.factor.factorize(&self.matrices.blocks).is_err() {
+                // Next to rounding, the matrix without the derivatives is the safer one.
+                quadrature.softened = false;
+                self.assemble(quadrature, loads.terms);
+                quadrature.softened = true;
+                self.factor.factorize(&self.matrices.blocks).map_err(|e| self.explain(e))?;
+            }
             report.seconds.factor += clock.elapsed().as_secs_f64();
             let clock = Instant::now();
             self.correct(quadrature, work);
-            (report.corrections, report.iterations) =
-                (report.corrections + 1, report.iterations + 1);
+            report.corrections += 1;
+            report.iterations += 1;
             current = near || updates == most_updates;
             let slope = self.slope(work);
             let power = report.dissipation.max(REST * report.power_scale);
             report.decrement = Some((slope.abs() / power).sqrt());
             quadrature.keep_softening();
-            let share =
+            let (share, evaluated) =
                 self.search(quadrature, matter, loads, (flow, &pressure, &mut along), work, slope);
-            last = Some(share);
+            last = Some((share, evaluated));
             add_scaled(&mut flow.velocity, share, &work.correction.velocity);
             add_scaled(&mut flow.pressure, share, &work.correction.pressure);
             report.seconds.solve += clock.elapsed().as_secs_f64();
@@ -180,7 +198,8 @@ impl<const D: usize> Stokes<D> {
         slope
     }
 
-    /// Share of the correction to be applied, at most one. `slope`: that at the start.
+    /// Share of the correction to be applied, at most one, and whether laws and residual are those
+    /// of the flow after it. `slope`: that at the start.
     fn search(
         &mut self,
         quadrature: &mut Quadrature,
@@ -189,7 +208,7 @@ impl<const D: usize> Stokes<D> {
         (flow, pressure, along): (&Flow<D>, &[[f64; 3]], &mut Flow<D>),
         work: &mut Work<D>,
         slope: f64,
-    ) -> f64 {
+    ) -> (f64, bool) {
         // Ends of the interval that holds the minimum, with their slopes.
         let (mut low, mut high) = ([0.0, slope], None::<[f64; 2]>);
         let mut share = 1.0;
@@ -205,14 +224,14 @@ impl<const D: usize> Stokes<D> {
             let here = self.slope(work);
             if here >= -OVERSHOOT * slope.abs() && (share == 1.0 || here <= OVERSHOOT * slope.abs())
             {
-                break;
+                return (share, true);
             }
             if here < 0.0 || here.is_nan() {
                 high = Some([share, here]);
             } else {
                 low = [share, here];
             }
-            let Some(high) = high else { break };
+            let Some(high) = high else { return (share, true) };
             let [a, b] = [low, high];
             // The secant, kept away from the ends of the interval.
             let secant = a[0] + (b[0] - a[0]) * a[1] / (a[1] - b[1]);
@@ -223,7 +242,7 @@ impl<const D: usize> Stokes<D> {
                 0.5 * (a[0] + b[0])
             };
         }
-        share
+        (share, false)
     }
 
     /// Sets the norms and powers of a residual in the report.

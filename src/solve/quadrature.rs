@@ -65,6 +65,8 @@ pub struct Quadrature {
     softening_before: Vec<Vec<SofteningPoint>>,
     /// Directions of the stresses at these points.
     directions: Vec<Directions>,
+    /// Whether the element matrices have these derivatives.
+    pub(super) softened: bool,
     /// Volume factors of the materials in the last update.
     factors: Vec<f64>,
 }
@@ -97,6 +99,7 @@ impl Quadrature {
             softening: vec![],
             softening_before: vec![],
             directions: vec![],
+            softened: true,
             factors: vec![],
         }
     }
@@ -161,9 +164,11 @@ impl Quadrature {
         self.cut[cell].as_deref()
     }
 
-    /// Derivatives of the viscosities at the points of a cell, with the directions of the stresses.
+    /// Derivatives of the viscosities at the points of a cell, with the directions of the stresses,
+    /// that the element matrices have.
     pub fn softening(&self, cell: usize) -> impl Iterator<Item = (&SofteningPoint, &Rates)> {
-        let points = self.softening.get(cell).into_iter().flatten();
+        let known = self.softening.get(cell).filter(|_| self.softened);
+        let points = known.into_iter().flatten();
         points.zip(self.directions.get(cell).into_iter().flatten())
     }
 
@@ -175,9 +180,13 @@ impl Quadrature {
         });
     }
 
-    /// Keeps the current derivatives for [`Quadrature::turn`].
+    /// Keeps the current derivatives for [`Quadrature::turn`]; the laws must be evaluated again
+    /// before it.
     pub fn keep_softening(&mut self) {
-        self.softening_before.clone_from(&self.softening);
+        self.softening_before.resize_with(self.softening.len(), Vec::new);
+        std::mem::swap(&mut self.softening_before, &mut self.softening);
+        // Cells that are not evaluated again have none.
+        self.softening.iter_mut().for_each(Vec::clear);
     }
 
     /// Advances the directions of the stresses after the share `share` of a correction.
