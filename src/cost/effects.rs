@@ -61,6 +61,7 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
         EffectKind::BodyForce | EffectKind::Flow | EffectKind::Gravity => return None,
         EffectKind::Acceleration | EffectKind::CutCells => return None,
         EffectKind::CarriedViscosity | EffectKind::CarriedDensity => return None,
+        EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => return None,
     }
     // The quantity of interest may have been removed with the effect.
     s.interest = None;
@@ -127,6 +128,7 @@ pub fn measure(plan: &Arc<Plan>, list: &mut EffectList, steps: u32) -> Result<()
     for e in list.effects.iter_mut().filter(|e| e.solved) {
         e.share = match e.kind {
             EffectKind::Flow | EffectKind::CarriedDensity | EffectKind::CarriedViscosity => None,
+            EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => None,
             // Computed once, at the start.
             EffectKind::BodyForce => Some(0.0),
             EffectKind::Gravity | EffectKind::Acceleration => Some(phases.weight / total),

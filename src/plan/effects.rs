@@ -34,6 +34,12 @@ pub enum EffectKind {
     Gauges,
     /// Cells that contain several materials.
     CutCells,
+    /// Viscosities that depend on the flow: friction, a yield stress or a flow index.
+    FlowCurves,
+    /// The zero of the pressure of a closed domain.
+    PressureZero,
+    /// Inertia.
+    Inertia,
 }
 
 impl EffectKind {
@@ -54,6 +60,9 @@ impl EffectKind {
             Dye => "dye lines",
             Gauges => "gauges",
             CutCells => "cut cells",
+            FlowCurves => "flow curves",
+            PressureZero => "the zero of the pressure",
+            Inertia => "inertia",
         }
     }
 }
@@ -350,6 +359,13 @@ impl Plan {
             0,
             &[],
         );
+        let no = "no material has friction, a yield stress or a flow index";
+        let stage = "iterations of the flow curves";
+        add(FlowCurves, e.flow_curves, why(e.flow_curves, self.curves(), no), 0, 0, &[stage]);
+        let (given, reason) = self.zero_of_pressure();
+        add(PressureZero, given, reason, 0, 0, &[]);
+        let yes = "`inertia = true`; the rotation of grains has no inertia".to_string();
+        add(Inertia, e.inertia, why(e.inertia, yes, self.no_inertia()), 0, 0, &["momentum"]);
         list
     }
 }

@@ -13,6 +13,7 @@ pub mod loads;
 pub mod material;
 pub mod memory;
 mod meshing;
+mod reasons;
 mod resolve;
 pub mod units;
 mod warning;
@@ -313,6 +314,12 @@ impl Plan {
     /// Number of unknowns per node: 2, or 3 with rotation.
     pub fn unknowns_per_node(&self) -> usize {
         if self.effects.rotation { 3 } else { 2 }
+    }
+
+    /// Whether a material has friction.
+    pub fn has_friction(&self) -> bool {
+        let rubs = |m: &Material| m.law.curve.is_some_and(|c| c.depends_on_pressure());
+        self.state.materials.iter().any(rubs)
     }
 
     /// Whether gravity or an acceleration acts on the materials.

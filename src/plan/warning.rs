@@ -66,6 +66,12 @@ pub enum Warning {
         /// Its lower left corner, m.
         corner: [f64; 2],
     },
+    /// Grains without an internal length flow at inertial numbers at which the equations are
+    /// ill-posed.
+    IllPosed {
+        /// Largest share of the flowing volume.
+        share: f64,
+    },
     /// Regions are too small to contain a particle.
     RegionsEmpty {
         /// Indices of the regions.
@@ -86,7 +92,8 @@ impl fmt::Display for Warning {
             Warning::Inertia { reynolds } => write!(
                 f,
                 "inertia is not solved, but these numbers have a Reynolds number of {reynolds:.1e}: \
-                 read the result as the creeping flow of a scaled, more viscous scene"
+                 read the result as the creeping flow of a scaled, more viscous scene, or set \
+                 inertia = true"
             ),
             Warning::ThinFluid { dense, thin, ratio } => write!(
                 f,
@@ -138,6 +145,13 @@ impl fmt::Display for Warning {
                 f,
                 "the domain is far from zero: positions are computed, recorded and exported \
                  relative to its lower left corner ({x}, {y}) m"
+            ),
+            Warning::IllPosed { share } => write!(
+                f,
+                "up to {:.0} % of the flowing grains had inertial numbers at which the law of \
+                 friction alone is ill-posed: bands and small waves there depend on the mesh; give \
+                 the grains internal_length and coupling_ratio",
+                100.0 * share
             ),
             Warning::RegionsEmpty { regions } => {
                 let list: Vec<String> = regions.iter().map(|k| format!("regions[{k}]")).collect();

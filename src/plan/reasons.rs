@@ -1,0 +1,66 @@
+//! This module states why flow curves, the zero of the pressure and inertia are solved or not, for
+//! `grainscope plan`.
+
+use super::Plan;
+use super::material::Material;
+use crate::laws::flow_curve::{FlowCurve, Strength};
+
+/// A number with three digits.
+fn short(value: f64) -> String {
+    let rounded = format!("{value:.2e}").parse().unwrap_or(value);
+    let plain = rounded == 0.0 || (1e-3..1e5).contains(&rounded.abs());
+    if plain { format!("{rounded}") } else { format!("{rounded:e}") }
+}
+
+impl Plan {
+    /// The materials with a flow curve, and the bounds of their viscosity.
+    pub(super) fn curves(&self) -> String {
+        let curve = |m: &Material| Some(self.curve(&m.name, m.law.curve.as_ref()?));
+        self.state.materials.iter().filter_map(curve).collect::<Vec<_>>().join("; ")
+    }
+
+    fn curve(&self, name: &str, curve: &FlowCurve) -> String {
+        let u = &self.units;
+        let [low, high] = [curve.smallest, curve.largest].map(|v| short(v * u.viscosity));
+        let what = match &curve.strength {
+            Strength::HerschelBulkley { yield_stress: 0.0, index, .. } => {
+                format!("power law of index {}", short(*index))
+            }
+            Strength::HerschelBulkley { yield_stress, .. } => {
+                format!("yield stress {} Pa", short(yield_stress * u.stress()))
+            }
+            Strength::Friction(f) => {
+                let range = f.well_posed_range().map(|ends| ends.map(short));
+                let range = range.map_or("none".into(), |[a, b]| format!("{a} to {b}"));
+                format!("friction, well posed without an internal length for I = {range}")
+            }
+        };
+        format!("{name}: {what}, viscosity {low} to {high} Pa s")
+    }
+
+    /// Whether the pressure is given at a point, and the reason.
+    pub(super) fn zero_of_pressure(&self) -> (bool, String) {
+        let Some(point) = &self.pressure_reference else {
+            let reason = if self.boundary.closed {
+                "closed domain without friction: the mean of the pressure is zero"
+            } else {
+                "the boundaries determine the pressure"
+            };
+            return (false, reason.into());
+        };
+        let [x, y] = self.si(point.at);
+        let at = [x + self.origin[0], y + self.origin[1]].map(short);
+        let place =
+            format!("{} Pa at ({}, {}) m", short(point.value * self.units.stress()), at[0], at[1]);
+        let cause = match &self.scene.pressure_reference {
+            Some(_) => "[pressure_reference]",
+            None => "friction in a closed domain: the highest background",
+        };
+        (true, format!("{cause}, {place}"))
+    }
+
+    /// Why inertia is not solved.
+    pub(super) fn no_inertia(&self) -> &'static str {
+        if self.scene.inertia { "nothing has a density" } else { "creeping flow" }
+    }
+}
