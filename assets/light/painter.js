@@ -35,6 +35,11 @@ function short(value, digits = 3) {
   return String(Number(value.toPrecision(digits)));
 }
 
+// The name of a field in words.
+function inWords(name) {
+  return name.replace(/_/g, " ");
+}
+
 // The unit in which times up to `end` (s) are shown: [name, seconds].
 function timeUnit(end) {
   const units = [["µs", 1e-6], ["ms", 1e-3], ["s", 1], ["min", 60], ["h", 3600], ["d", 86400], ["a", 31557600]];
@@ -220,7 +225,7 @@ function paintKey(surface, description, frame, look, { left, right, bottom }, pl
     const bar = new Uint8Array(4 * 256).fill(255);
     for (let k = 0; k < 256; k++) for (let c = 0; c < 3; c++) bar[4 * k + c] = palette[3 * k + c];
     surface.image(bar, 256, 1, x, y, length, 8 * unit);
-    const title = field.unit ? `${field.name} (${field.unit})` : field.name;
+    const title = field.unit ? `${inWords(field.name)} (${field.unit})` : inWords(field.name);
     surface.text(short(ends[0]), x, y + 20 * unit, size, theme.soft, "start");
     surface.text(title, x + 0.5 * length, y + 20 * unit, size, theme.ink, "middle");
     surface.text(short(ends[1]), x + length, y + 20 * unit, size, theme.soft, "end");

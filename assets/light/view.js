@@ -94,8 +94,8 @@ class LightView {
   offer() {
     const fields = this.runs[0].description.fields.map((f) => f.name);
     const option = (value, text) => make("option", { value }, text);
-    this.colour.replaceChildren(option("material", "material"), ...fields.map((f) => option(f, f)));
-    this.field.replaceChildren(option("", "none"), ...fields.map((f) => option(f, f)));
+    this.colour.replaceChildren(option("material", "material"), ...fields.map((f) => option(f, inWords(f))));
+    this.field.replaceChildren(option("", "none"), ...fields.map((f) => option(f, inWords(f))));
     if (!fields.includes(this.look.colour)) this.look.colour = "material";
     if (!fields.includes(this.look.field)) this.look.field = "";
     [this.colour.value, this.field.value] = [this.look.colour, this.look.field];
@@ -292,7 +292,7 @@ class LightView {
     if (near >= 0) lines.push(panel.description.materials[panel.frame.material[near]].name);
     for (const field of Object.values(panel.frame.fields)) {
       const value = fieldAt(field, panel.description, x, y);
-      if (value === value) lines.push(`${field.name} ${short(value)} ${field.unit}`);
+      if (value === value) lines.push(`${inWords(field.name)} ${short(value)} ${field.unit}`);
     }
     tip.replaceChildren(...lines.map((line) => make("div", {}, line)));
     tip.hidden = false;

@@ -84,6 +84,8 @@ fn particle_quantity(colour_by: ColourBy) -> Option<Quantity> {
         ColourBy::StrainRate => quantity("strain rate", "1/s", false),
         ColourBy::Viscosity => quantity("viscosity", "Pa s", false),
         ColourBy::Alignment => quantity("|n_x|", "", false),
+        ColourBy::InertialNumber => quantity("inertial number", "", false),
+        ColourBy::Yielded => quantity("yielded", "", false),
     })
 }
 
@@ -95,6 +97,10 @@ fn field_quantity(plan: &Plan, name: FieldName) -> Option<Quantity> {
         FieldName::Pressure => quantity("pressure", "Pa", false),
         FieldName::Alignment if !plan.effects.directors => return None,
         FieldName::Alignment => quantity("alignment", "", false),
+        FieldName::InertialNumber if !plan.has_friction() => return None,
+        FieldName::InertialNumber => quantity("inertial_number", "", false),
+        FieldName::Yielded if !plan.effects.flow_curves => return None,
+        FieldName::Yielded => quantity("yielded", "", false),
     })
 }
 

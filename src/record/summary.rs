@@ -71,6 +71,10 @@ pub struct Summary {
     /// Volume mean of |n_x| over particles with layers; absent without directors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_alignment: Option<f64>,
+    /// Share of the flowing grains at the end whose inertial number lies outside the well-posed
+    /// range; absent without friction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ill_posed_share: Option<f64>,
     /// Errors of the balances.
     pub balances: Balances,
     /// Counts of splits, merges, particles held at walls or lost through open sides, and healed
@@ -303,6 +307,7 @@ impl Summary {
                 .zip(row.drift.iter().copied())
                 .collect(),
             mean_alignment: row.mean_alignment,
+            ill_posed_share: plan.has_friction().then_some(row.ill_posed_share),
             balances: Balances {
                 power_error: tally.largest_power_error,
                 divergence_error: tally.largest_divergence,

@@ -26,6 +26,8 @@ pub(super) struct Summary {
     #[serde(default)]
     pub(super) mean_alignment: Option<f64>,
     #[serde(default)]
+    pub(super) ill_posed_share: Option<f64>,
+    #[serde(default)]
     pub(super) recording: Option<PathBuf>,
     /// The text of the file.
     #[serde(skip)]
@@ -75,6 +77,7 @@ impl Summary {
         put("max_speed", self.max_speed);
         put("rms_speed", self.rms_speed);
         put("mean_alignment", self.mean_alignment);
+        put("ill_posed_share", self.ill_posed_share);
         for (material, drift) in &self.volume_drift {
             put(&format!("{material}.volume_drift"), *drift);
         }

@@ -820,10 +820,15 @@ pub enum ColourBy {
     Pressure,
     /// Strain rate, 1/s.
     StrainRate,
-    /// Shear viscosity, Pa s.
+    /// Shear viscosity, Pa s; with friction, a yield stress or a flow index that of the flow.
     Viscosity,
     /// Alignment |n_x| of the director.
     Alignment,
+    /// Inertial number I = d g sqrt(rho_s/p) of grains with friction.
+    InertialNumber,
+    /// 1 where a material with friction, a yield stress or a flow index yields, 0 where its viscosity
+    /// is the largest.
+    Yielded,
 }
 
 /// Fields that can be recorded on a grid.
@@ -838,6 +843,11 @@ pub enum FieldName {
     Pressure,
     /// Mean alignment |n_x| of the directors, with isolines.
     Alignment,
+    /// Inertial number I = d g sqrt(rho_s/p) of grains with friction.
+    InertialNumber,
+    /// 1 where a material with friction, a yield stress or a flow index yields, 0 where its viscosity
+    /// is the largest.
+    Yielded,
 }
 
 /// A scheduled change of values, which takes effect at a time or with the solution of a step.

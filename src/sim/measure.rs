@@ -216,6 +216,9 @@ impl<const D: usize> Simulation<D> {
             rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
                 * u.area_rate(),
         }));
+        let [ill_posed_share, classical] =
+            if plan.has_friction() { self.ill_posed_shares() } else { [0.0; 2] };
+        self.largest_ill_posed = self.largest_ill_posed.max(classical);
         let measured = Measured {
             plan: &plan,
             units: u,
@@ -229,6 +232,7 @@ impl<const D: usize> Simulation<D> {
             limiter,
             iterations,
             nonlinear: r.iterations,
+            ill_posed_share,
             kinetic_energy,
             max_speed: self.flow.max_speed() * u.velocity(),
             rms_speed: self.flow.rms_speed(&plan.mesh) * u.velocity(),

@@ -33,6 +33,7 @@ pub mod snapshot;
 mod solution;
 pub mod state;
 mod step;
+mod yielding;
 
 pub use error::SimError;
 pub use fault::{Fault, Place};
@@ -45,6 +46,7 @@ use crate::scene::Integrator;
 use crate::solve::multifrontal::Effort;
 use crate::space::particles::Particles;
 use crate::space::population::Count;
+use criteria::ILL_POSED;
 use row::Row;
 use state::{State, StateError};
 use std::sync::Arc;
@@ -108,6 +110,9 @@ impl<const D: usize> Run for Simulation<D> {
         }
         if let Some(dye) = self.dye.as_ref().filter(|d| d.is_full()) {
             list.push(Warning::DyeCoarse { points: dye.points() });
+        }
+        if self.largest_ill_posed > ILL_POSED {
+            list.push(Warning::IllPosed { share: self.largest_ill_posed });
         }
         list
     }

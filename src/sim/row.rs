@@ -224,6 +224,8 @@ pub struct Measured<'a> {
     pub iterations: u32,
     /// Number of iterations of the flow curves of the last solution.
     pub nonlinear: u32,
+    /// See [`Row::ill_posed_share`].
+    pub ill_posed_share: f64,
     /// Kinetic energy, J/m.
     pub kinetic_energy: f64,
     /// Largest speed, m/s.
@@ -348,6 +350,13 @@ columns! {
     /// the step.
     nonlinear_iterations: u32 = |m| m.nonlinear, 0, {
         label: "nonlinear iterations", exists: |p| p.effects.flow_curves,
+    };
+    /// Share of the flowing volume of grains with friction whose inertial number lies outside the
+    /// range in which the equations without an internal length are well posed. Material at rest and
+    /// material at a bound of its viscosity do not count; 0 if nothing flows.
+    ill_posed_share: f64 = |m| m.ill_posed_share, 0.0, {
+        label: "ill-posed share", path: "diagnostics/ill_posed_share",
+        exists: Plan::has_friction,
     };
     /// Number of particles.
     particles: usize = |m| m.particles.len(), 0, { label: "particles", rank: Rank::Value(11) };

@@ -5,6 +5,7 @@ mod raster;
 
 use super::initial::Unfilled;
 use super::simulation::Simulation;
+use super::yielding::Local;
 use crate::frame::{Arrows, GridField, ParticleScalar, ParticleSnapshot, Snapshot};
 use crate::laws::director;
 use crate::motion::tracers::DyeLines;
@@ -86,6 +87,16 @@ fn dye_lines(plan: &Plan, dye: &DyeLines) -> Vec<Vec<[f32; 2]>> {
     dye.wrapped(&plan.mesh).iter().map(|l| l.iter().map(si).collect()).collect()
 }
 
+/// Inertial number of grains; NaN elsewhere.
+fn inertial_number(local: Option<Local>) -> f64 {
+    local.and_then(|l| l.inertial_number).unwrap_or(f64::NAN)
+}
+
+/// 1 where a material with a flow curve yields, 0 where it does not; NaN elsewhere.
+fn yielded(local: Option<Local>) -> f64 {
+    local.map_or(f64::NAN, |l| f64::from(u8::from(l.yields)))
+}
+
 impl<const D: usize> Simulation<D> {
     pub(super) fn draw(&self) -> Snapshot {
         let plan = &self.plan;
@@ -140,15 +151,18 @@ impl<const D: usize> Simulation<D> {
                 }
                 ColourBy::Viscosity => {
                     let m = &self.matter.materials[self.particles.material[p] as usize];
-                    let eta = match &self.particles.viscosity {
-                        Some(v) if m.carries_viscosity => v[p],
-                        _ => m.viscosity,
+                    let eta = match (self.local(p, cell, r), &self.particles.viscosity) {
+                        (Some(local), _) => local.viscosity,
+                        (None, Some(v)) if m.carries_viscosity => v[p],
+                        (None, _) => m.viscosity,
                     };
                     eta * u.viscosity
                 }
                 ColourBy::Alignment => {
                     self.particles.director.as_ref().map_or(f64::NAN, |d| d[p][0].abs())
                 }
+                ColourBy::InertialNumber => inertial_number(self.local(p, cell, r)),
+                ColourBy::Yielded => yielded(self.local(p, cell, r)),
             }
         };
         if colour_by == ColourBy::Material {
@@ -157,7 +171,8 @@ impl<const D: usize> Simulation<D> {
         let mut values = vec![0.0; shown.len()];
         threads::for_each(&mut values, SAMPLE_GRAIN, |k, v| *v = value(shown[k]) as f32);
         let range = match colour_by {
-            ColourBy::Alignment => [0.0, 1.0],
+            ColourBy::Alignment | ColourBy::Yielded => [0.0, 1.0],
+            ColourBy::InertialNumber => self.inertial_range(),
             ColourBy::Rotation => symmetric(range(&values)),
             _ => range(&values),
         };
@@ -171,6 +186,12 @@ impl<const D: usize> Simulation<D> {
         let raster = Raster::new(plan, FIELD_SAMPLES);
         let (title, values): (&str, Vec<f32>) = match name {
             FieldName::Rotation if D != 3 => return None,
+            FieldName::InertialNumber if !plan.has_friction() => return None,
+            FieldName::InertialNumber => {
+                ("inertial_number", self.sample_locals(&raster, inertial_number))
+            }
+            FieldName::Yielded if !plan.effects.flow_curves => return None,
+            FieldName::Yielded => ("yielded", self.sample_locals(&raster, yielded)),
             FieldName::Alignment => ("alignment", self.alignment()?.sample(&raster)),
             FieldName::Speed | FieldName::Rotation | FieldName::Pressure => {
                 let [columns, rows] = raster.stand(mesh);
@@ -212,6 +233,8 @@ impl<const D: usize> Simulation<D> {
             FieldName::Speed => [0.0, range(&values)[1]],
             FieldName::Rotation => symmetric(range(&values)),
             FieldName::Pressure => range(&values),
+            FieldName::InertialNumber => self.inertial_range(),
+            FieldName::Yielded => [0.0, 1.0],
         };
         Some(GridField {
             name: title.into(),
@@ -222,6 +245,20 @@ impl<const D: usize> Simulation<D> {
             values,
             range,
         })
+    }
+
+    /// Values of materials with a flow curve at the points of a raster.
+    fn sample_locals(&self, raster: &Raster, value: fn(Option<Local>) -> f64) -> Vec<f32> {
+        let mesh = &self.plan.mesh;
+        let [columns, rows] = raster.stand(mesh);
+        let mut values = vec![0.0; raster.len()];
+        threads::for_each(&mut values, SAMPLE_GRAIN, |k, v| {
+            let (x, y) = (&columns[k % raster.n[0]], &rows[k / raster.n[0]]);
+            let cell = mesh.cell(x.cell, y.cell);
+            let local = if mesh.solid[cell] { None } else { self.local_at(cell, [x.r, y.r]) };
+            *v = value(local) as f32;
+        });
+        values
     }
 
     /// Whether a cell contains a Cosserat material.
