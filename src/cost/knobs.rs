@@ -4,7 +4,7 @@ use crate::plan::{Plan, resolve};
 use crate::scene::{Integrator, Moment, Quadrature, Scene, SceneError, Scope};
 
 /// All knobs: name, scene keys, and description of the levels that are tried.
-pub const KNOBS: [(&str, &str, &str); 7] = [
+pub const KNOBS: [(&str, &str, &str); 10] = [
     ("cells", "accuracy.cells", "fewer and more cells, by factors of sqrt 2"),
     ("grading", "mesh.grading", "none, and smaller or larger cells where the mesh is graded"),
     ("particles", "accuracy.particles_per_cell", "square numbers from 4"),
@@ -16,6 +16,21 @@ pub const KNOBS: [(&str, &str, &str); 7] = [
     ),
     ("integrator", "accuracy.integrator", "euler, extrapolated, midpoint"),
     ("tolerance", "accuracy.tolerance", "1e-5, 1e-8 and the scene's own"),
+    (
+        "largest viscosity",
+        "materials.<name>.largest_viscosity",
+        "by factors of 0.01, 0.1 and 10, of all materials with a flow curve",
+    ),
+    (
+        "smallest viscosity",
+        "materials.<name>.smallest_viscosity",
+        "by factors of 100, 10 and 0.1, of all materials with a flow curve",
+    ),
+    (
+        "nonlinear tolerance",
+        "accuracy.nonlinear_tolerance",
+        "1e-1, 1e-2, 1e-3, 1e-4 and the scene's own, with a flow curve",
+    ),
 ];
 
 /// A value of a knob.
@@ -234,6 +249,57 @@ fn tolerance(scene: &Scene) -> Option<Knob> {
     Knob::new("tolerance", levels, 1.0)
 }
 
+/// A bound of the viscosities of all materials with a flow curve, times each of the factors; `None`
+/// if there are no such materials. Factors with which a smallest viscosity would be above a largest one
+/// are left out.
+fn bound(plan: &Plan, largest: bool, factors: [f64; 4]) -> Option<Knob> {
+    let curves: Vec<_> =
+        plan.state.materials.iter().filter_map(|m| Some((m, m.law.curve?))).collect();
+    if curves.is_empty() {
+        return None;
+    }
+    let (name, key) = if largest {
+        ("largest viscosity", "largest_viscosity")
+    } else {
+        ("smallest viscosity", "smallest_viscosity")
+    };
+    let fits = |factor: f64| {
+        curves.iter().all(|(_, c)| {
+            let ratio = if largest { factor } else { 1.0 / factor };
+            c.smallest < ratio * c.largest
+        })
+    };
+    let levels = factors.into_iter().filter(|&f| fits(f)).map(|factor| {
+        let mut sets = vec![];
+        for (m, c) in curves.iter().filter(|_| factor != 1.0) {
+            let own = if largest { c.largest } else { c.smallest };
+            let value = factor * own * plan.units.viscosity;
+            sets.push(format!("materials.{}.{key}={value:e}", m.name));
+        }
+        Level { label: format!("{name} x {factor}"), sets, size: None }
+    });
+    Knob::new(name, levels.collect(), 1.0)
+}
+
+/// The tolerance of the iteration for flow curves; `None` without them.
+fn nonlinear_tolerance(scene: &Scene, plan: &Plan) -> Option<Knob> {
+    if !plan.effects.flow_curves {
+        return None;
+    }
+    let own = scene.accuracy.nonlinear_tolerance;
+    let mut tried = vec![1e-1, 1e-2, 1e-3, 1e-4];
+    if !tried.contains(&own) {
+        tried.push(own);
+        tried.sort_by(|a, b| b.total_cmp(a));
+    }
+    let level = |t: f64| Level {
+        label: format!("nonlinear tolerance {t:e}"),
+        sets: if t == own { vec![] } else { vec![format!("accuracy.nonlinear_tolerance={t:e}")] },
+        size: None,
+    };
+    Knob::new("nonlinear tolerance", tried.into_iter().map(level).collect(), 1.0)
+}
+
 /// `--set` assignments that refine every knob with a size by a ratio (coarsen if below 1).
 pub fn rung(scene: &Scene, ratio: f64, at: Moment) -> Result<Vec<String>, SceneError> {
     let scope = Scope::new(scene)?;
@@ -274,6 +340,9 @@ impl Design {
             knobs.push(choice("integrator", "accuracy.integrator", own, &words));
         }
         knobs.push(tolerance(scene));
+        knobs.push(bound(plan, true, [0.01, 0.1, 1.0, 10.0]));
+        knobs.push(bound(plan, false, [100.0, 10.0, 1.0, 0.1]));
+        knobs.push(nonlinear_tolerance(scene, plan));
         Ok(Design { knobs: knobs.into_iter().flatten().collect() })
     }
 
@@ -318,9 +387,20 @@ mod tests {
     fn only_knobs_with_an_effect_are_varied() {
         let names = |d: &Design| d.knobs.iter().map(|k| k.name).collect::<Vec<_>>();
         let (_, silo) = design("silo", Moment::End);
-        assert_eq!(names(&silo), KNOBS.map(|k| k.0), "the silo has all knobs");
+        let (plain, of_curves) = KNOBS.split_at(7);
+        assert_eq!(names(&silo), plain.iter().map(|k| k.0).collect::<Vec<_>>());
         let (_, couette) = design("couette_cosserat", Moment::Start);
         assert_eq!(names(&couette), ["cells", "grading", "particles", "tolerance"]);
+        let mud = presets::find("rayleigh_taylor")
+            .and_then(|s| s.with_sets(&["materials.heavy.yield_stress=0.01".into()]))
+            .expect("a preset");
+        let scene = parse(&mud).expect("valid");
+        let plan = resolve(&scene).expect("valid");
+        let mud = Design::new(&scene, &plan, Moment::Start, &[1.0]).expect("a design");
+        assert_eq!(
+            names(&mud)[names(&mud).len() - 3..],
+            of_curves.iter().map(|k| k.0).collect::<Vec<_>>()
+        );
     }
 
     #[test]
