@@ -287,6 +287,27 @@ mod tests {
     }
 
     #[test]
+    fn a_parameter_of_friction_takes_effect_at_once() {
+        let text = presets::find("rayleigh_taylor").expect("a preset").text().replace(
+            "\nshear_viscosity = 1\n",
+            "\nfriction = { static = \"mu\", grain_diameter = 0.01 }\n",
+        );
+        let text = text.replacen(
+            "[domain]",
+            "[parameters.mu]\ndefault = 0.3\nmin = 0.1\nmax = 0.5\n\n\
+             [pressure_reference]\nat = [0.1, 1]\n\n[domain]",
+            1,
+        );
+        let draft = Draft::new(crate::scene::SceneSource::new("grains.toml", text));
+        let plan = draft.plan().expect("valid");
+        let knobs = knobs(&draft, &plan);
+        let mu = knobs.iter().find(|k| k.key == "mu").expect("a knob");
+        assert_eq!((mu.value, mu.min, mu.max, mu.restarts), (0.3, Some(0.1), Some(0.5), None));
+        let changed = draft.with("mu", "0.4").and_then(|d| d.plan()).expect("valid");
+        assert!(changed.state != plan.state);
+    }
+
+    #[test]
     fn zero_parameters_switch_effects_off() {
         let (draft, plan) = silo();
         let knobs = knobs(&draft, &plan);

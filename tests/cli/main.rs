@@ -4,6 +4,7 @@ mod commands;
 mod compare;
 mod cost;
 mod environment;
+mod grains;
 mod hostile;
 mod keeping;
 mod killed;

@@ -211,6 +211,64 @@ const FAULTS: &[Fault] = &[
     ("[domain]", "[domain", "", &["not TOML", "check the TOML syntax"]),
 ];
 
+/// Faults of [`grains::COLUMN`].
+const FAULTS_OF_GRAINS: &[Fault] = &[
+    (
+        "largest_viscosity = 1e3",
+        "shear_viscosity = 5",
+        "\"mu\", dyn",
+        &["material `sand` has both friction and shear_viscosity", "give one of the two"],
+    ),
+    (
+        "largest_viscosity = 1e3",
+        "coupling_viscosity = 5",
+        "5\n\n[materials.air]",
+        &["material `sand` has both coupling_viscosity and a flow curve", "give coupling_ratio"],
+    ),
+    (
+        "shear_viscosity = 1e-3",
+        "shear_viscosity = 1e-3\ncohesion = 2",
+        "2\nbackground",
+        &["material `air` has cohesion but no friction", "give friction = {"],
+    ),
+    (
+        "largest_viscosity = 1e3",
+        "largest_viscosity = 1e3\nsmallest_viscosity = 2e3",
+        "2e3",
+        &["`sand`: smallest_viscosity 2000 is above largest_viscosity 1000", "between the two"],
+    ),
+    (
+        "background = true",
+        "background = true\nyield_stress = 1",
+        "",
+        &["the background `air` has a flow curve", "a constant viscosity"],
+    ),
+    (
+        "inertia = true",
+        "initial_velocity = { x = 1 }",
+        "",
+        &["initial_velocity is given, but a flow without inertia", "`inertia = true`"],
+    ),
+    (
+        "[boundaries]",
+        "[pressure_reference]\nat = [1.5, 1]\n\n[boundaries]",
+        "1.5, 1]",
+        &["pressure_reference is given, but the boundaries determine", "remove it"],
+    ),
+    (
+        "particles_per_cell = 9",
+        "particles_per_cell = 9\nnonlinear_tolerance = 0.5",
+        "",
+        &["accuracy.nonlinear_tolerance is 0.5"],
+    ),
+    (
+        "static = \"mu\"",
+        "static = 0.7",
+        "0.6, inertial",
+        &["friction.dynamic 0.6 is below friction.static 0.7", "a falling law is not solved"],
+    ),
+];
+
 /// `[file:line:column]` of a piece of text.
 fn place(text: &str, piece: &str) -> String {
     let at = text.find(piece).unwrap_or_else(|| panic!("no {piece:?} in {text}"));
@@ -232,9 +290,11 @@ fn the_box_is_valid_and_at_rest() {
 #[test]
 fn errors_have_a_location_and_a_remedy() {
     let here = TempFolder::new();
-    for (from, to, at, complaints) in FAULTS {
-        assert!(BOX.contains(from), "{from}");
-        let text = BOX.replacen(from, to, 1);
+    let grains = FAULTS_OF_GRAINS.iter().map(|fault| (grains::COLUMN, fault));
+    let all = FAULTS.iter().map(|fault| (BOX, fault)).chain(grains);
+    for (scene, (from, to, at, complaints)) in all {
+        assert!(scene.contains(from), "{from}");
+        let text = scene.replacen(from, to, 1);
         here.write("box.toml", &text);
         for command in ["check", "plan", "run"] {
             let said = here.grainscope(&[command, "box.toml"]).exits(3).complains(complaints);
@@ -246,6 +306,26 @@ fn errors_have_a_location_and_a_remedy() {
         }
     }
     assert!(!here.has("runs"), "a refused scene created a folder");
+}
+
+/// Nothing determines the pressure of grains that fill a closed box.
+#[test]
+fn a_closed_box_of_grains_needs_a_pressure() {
+    let here = TempFolder::new();
+    let friction = "friction = { static = 0.3, grain_diameter = 0.01 }";
+    let text = BOX.replacen("shear_viscosity = 100", friction, 1);
+    here.write("box.toml", &text);
+    let complaints = [
+        "`sand` has friction, but nothing determines its pressure: the domain is closed",
+        "help: give [pressure_reference] with at = [x, y]",
+    ];
+    here.grainscope(&["check", "box.toml"]).exits(3).complains(&complaints);
+    let point = "[pressure_reference]\nat = [1, 1]\nvalue = 2\n\n[boundaries]";
+    here.write("box.toml", text.replacen("[boundaries]", point, 1));
+    here.grainscope(&["check", "box.toml"]).exits(0);
+    here.write("box.toml", text.replacen("[boundaries]", &point.replace("[1, 1]", "[1, 3]"), 1));
+    let complaints = ["the point of pressure_reference lies outside the material"];
+    here.grainscope(&["check", "box.toml"]).exits(3).complains(&complaints);
 }
 
 #[test]
