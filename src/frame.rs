@@ -299,6 +299,8 @@ pub struct Quantity {
     pub unit: String,
     /// Whether the sign matters; if so, zero is white and the colour scale symmetric.
     pub signed: bool,
+    /// Ends of the colour scale, if they do not follow the values.
+    pub ends: Option<[f32; 2]>,
 }
 
 impl Quantity {

@@ -92,8 +92,8 @@ function decodeFrame(bytes, description) {
 }
 
 // The value of a field at a point (m) by bilinear interpolation between the centres of its samples;
-// NaN outside, and where samples without a value have more than half of the weight.
-function fieldAt(field, description, px, py) {
+// NaN outside, and where samples with a value have less than `least` of the weight.
+function fieldAt(field, description, px, py, least = 0.5) {
   const [[x0, y0], [x1, y1]] = description.domain;
   const { nx, ny, values } = field;
   if (px < x0 || px > x1 || py < y0 || py > y1) return NaN;
@@ -109,5 +109,5 @@ function fieldAt(field, description, px, py) {
       if (value === value) { sum += weight * value; total += weight; }
     }
   }
-  return total >= 0.5 ? sum / total : NaN;
+  return total >= least ? sum / total : NaN;
 }

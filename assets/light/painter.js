@@ -167,7 +167,8 @@ function paintParticles(surface, description, frame, look, { X, Y, scale }) {
   }
   const { ends, palette } = scaleOf(field, description, look);
   for (let k = 0; k < n; k++) {
-    const value = fieldAt(field, description, frame.x[k], frame.y[k]);
+    // Particles at the edge of a field have a value.
+    const value = fieldAt(field, description, frame.x[k], frame.y[k], 1e-3);
     paint[k] = value === value ? shade(value, ends) : 128;
   }
   draw(palette, paint);

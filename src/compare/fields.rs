@@ -59,7 +59,7 @@ pub fn differences(members: &[Member], until: f64, notes: &mut Vec<String>) -> V
         };
         let quantities: Vec<Quantity> = (info_a.fields.iter())
             .filter(|q| a.contains_key(&q.name) && b.contains_key(&q.name))
-            .map(|q| Quantity { signed: true, ..q.clone() })
+            .map(|q| Quantity { signed: true, ends: None, ..q.clone() })
             .collect();
         if quantities.is_empty() {
             notes.push(format!(

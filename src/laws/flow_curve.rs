@@ -132,7 +132,15 @@ pub struct Viscosity {
 impl FlowCurve {
     /// Whether the stress depends on the pressure.
     pub fn depends_on_pressure(&self) -> bool {
-        matches!(self.strength, Strength::Friction(_))
+        self.friction().is_some()
+    }
+
+    /// Friction, if it determines the stress.
+    pub fn friction(&self) -> Option<&Friction> {
+        match &self.strength {
+            Strength::Friction(friction) => Some(friction),
+            Strength::HerschelBulkley { .. } => None,
+        }
     }
 
     /// Shear stress without the bounds of the viscosity, Pa, and its derivative with respect to the

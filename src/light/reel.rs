@@ -2,7 +2,7 @@
 
 use super::Description;
 use super::pack::{MOST_PARTICLES, pack, spacing};
-use crate::frame::{GridField, Snapshot, extent};
+use crate::frame::{GridField, RunInfo, Snapshot, extent};
 use crate::results::{Member, SAME_TIME};
 use indexmap::IndexMap;
 use std::path::PathBuf;
@@ -86,7 +86,7 @@ impl Reel {
                 fields: fields
                     .iter()
                     .filter_map(|list| at(list, *time))
-                    .map(|field| coarse(field, detail.samples))
+                    .map(|field| coarse(field, detail.samples, info))
                     .collect(),
                 ..Snapshot::default()
             };
@@ -127,14 +127,16 @@ pub fn widen(ranges: &mut Ranges, field: &str, range: [f32; 2]) {
 }
 
 /// A field on at most `samples` samples along its longer side. Its colour scale has the ends of its
-/// values; painters make the scale of a quantity with a sign symmetric.
-fn coarse(field: &GridField, samples: usize) -> GridField {
+/// values, unless its quantity has ends of its own; painters make the scale of a quantity with a sign
+/// symmetric.
+fn coarse(field: &GridField, samples: usize, info: &RunInfo) -> GridField {
     let every = field.nx.max(field.ny).div_ceil(samples.max(1)).max(1);
     let mut coarse = match every {
         1 => field.clone(),
         _ => field.on(field.rect(), field.nx.div_ceil(every), field.ny.div_ceil(every)),
     };
-    coarse.range = extent(&coarse.values).unwrap_or([0.0, 1.0]);
+    let ends = info.fields.iter().find(|q| q.name == field.name).and_then(|q| q.ends);
+    coarse.range = ends.or_else(|| extent(&coarse.values)).unwrap_or([0.0, 1.0]);
     coarse
 }
 

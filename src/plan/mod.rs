@@ -318,8 +318,14 @@ impl Plan {
 
     /// Whether a material has friction.
     pub fn has_friction(&self) -> bool {
-        let rubs = |m: &Material| m.law.curve.is_some_and(|c| c.depends_on_pressure());
-        self.state.materials.iter().any(rubs)
+        self.halfway_inertial_number().is_some()
+    }
+
+    /// Largest of the inertial numbers at which the friction of a material is halfway between its
+    /// limits, the end of the colour scale; `None` without friction.
+    pub fn halfway_inertial_number(&self) -> Option<f64> {
+        let of = |m: &Material| Some(m.law.curve.as_ref()?.friction()?.inertial_number);
+        self.state.materials.iter().filter_map(of).reduce(f64::max)
     }
 
     /// Whether gravity or an acceleration acts on the materials.

@@ -69,7 +69,7 @@ pub enum Warning {
     /// Grains without an internal length flow at inertial numbers at which the equations are
     /// ill-posed.
     IllPosed {
-        /// Largest share of the flowing volume.
+        /// Share of the flowing volume, mean over the run.
         share: f64,
     },
     /// Regions are too small to contain a particle.
@@ -148,9 +148,9 @@ impl fmt::Display for Warning {
             ),
             Warning::IllPosed { share } => write!(
                 f,
-                "up to {:.0} % of the flowing grains had inertial numbers at which the law of \
-                 friction alone is ill-posed: bands and small waves there depend on the mesh; give \
-                 the grains internal_length and coupling_ratio",
+                "{:.0} % of the flowing grains (mean over the run) had inertial numbers at which \
+                 the law of friction alone is ill-posed: bands and small waves there depend on the \
+                 mesh; give the grains internal_length and coupling_ratio",
                 100.0 * share
             ),
             Warning::RegionsEmpty { regions } => {

@@ -72,7 +72,12 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
 }
 
 fn quantity(name: &str, unit: &str, signed: bool) -> Quantity {
-    Quantity { name: name.into(), unit: unit.into(), signed }
+    Quantity { name: name.into(), unit: unit.into(), signed, ends: None }
+}
+
+/// A dimensionless quantity with fixed ends of its colour scale.
+fn bounded(name: &str, ends: [f32; 2]) -> Quantity {
+    Quantity { ends: Some(ends), ..quantity(name, "", false) }
 }
 
 fn particle_quantity(colour_by: ColourBy) -> Option<Quantity> {
@@ -97,10 +102,11 @@ fn field_quantity(plan: &Plan, name: FieldName) -> Option<Quantity> {
         FieldName::Pressure => quantity("pressure", "Pa", false),
         FieldName::Alignment if !plan.effects.directors => return None,
         FieldName::Alignment => quantity("alignment", "", false),
-        FieldName::InertialNumber if !plan.has_friction() => return None,
-        FieldName::InertialNumber => quantity("inertial_number", "", false),
+        FieldName::InertialNumber => {
+            bounded("inertial_number", [0.0, plan.halfway_inertial_number()? as f32])
+        }
         FieldName::Yielded if !plan.effects.flow_curves => return None,
-        FieldName::Yielded => quantity("yielded", "", false),
+        FieldName::Yielded => bounded("yielded", [0.0, 1.0]),
     })
 }
 

@@ -37,7 +37,7 @@ pub struct Criteria {
     pub margin: f64,
 }
 
-/// Share of the flowing grains above which a run warns that they flow where the law of friction alone
+/// Share of the flowing grains, mean over a run, above which a run warns that they flow where the law of friction alone
 /// is ill-posed.
 pub const ILL_POSED: f64 = 0.05;
 

@@ -216,9 +216,13 @@ impl<const D: usize> Simulation<D> {
             rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
                 * u.area_rate(),
         }));
-        let [ill_posed_share, classical] =
-            if plan.has_friction() { self.ill_posed_shares() } else { [0.0; 2] };
-        self.largest_ill_posed = self.largest_ill_posed.max(classical);
+        let mut ill_posed_share = 0.0;
+        if plan.has_friction() {
+            let [flowing, all, classical] = self.ill_posed_volumes();
+            ill_posed_share = if flowing > 0.0 { all / flowing } else { 0.0 };
+            self.flowed[0] += dt * classical;
+            self.flowed[1] += dt * flowing;
+        }
         let measured = Measured {
             plan: &plan,
             units: u,

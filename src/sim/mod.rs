@@ -111,8 +111,9 @@ impl<const D: usize> Run for Simulation<D> {
         if let Some(dye) = self.dye.as_ref().filter(|d| d.is_full()) {
             list.push(Warning::DyeCoarse { points: dye.points() });
         }
-        if self.largest_ill_posed > ILL_POSED {
-            list.push(Warning::IllPosed { share: self.largest_ill_posed });
+        let [ill_posed, flowed] = self.flowed;
+        if ill_posed > ILL_POSED * flowed {
+            list.push(Warning::IllPosed { share: ill_posed / flowed });
         }
         list
     }

@@ -209,7 +209,7 @@ impl<const D: usize> Simulation<D> {
         s.put_floats("first_energy", [self.first_energy]);
         s.put_floats("recent_energy", self.recent_energy);
         if self.plan.has_friction() {
-            s.put_floats("ill_posed", [self.largest_ill_posed]);
+            s.put_floats("flowed", self.flowed);
         }
         s.put_floats("baseline", self.baseline.iter().copied());
         s.put_floats("other_power", [self.last_other_power]);
@@ -271,7 +271,10 @@ impl<const D: usize> Simulation<D> {
         let [time] = s.numbers("time")?;
         let [first_energy] = s.numbers("first_energy")?;
         let recent_energy = s.numbers("recent_energy")?;
-        let ill_posed = s.try_floats("ill_posed").and_then(|v| v.first().copied());
+        let flowed = match s.try_floats("flowed") {
+            Some(_) => s.numbers("flowed")?,
+            None => [0.0; 2],
+        };
         let tolerated = s.floats("tolerated")?.first().copied();
         let baseline = s.exactly("baseline", materials)?;
         let [last_other_power] = s.numbers("other_power")?;
@@ -302,7 +305,7 @@ impl<const D: usize> Simulation<D> {
         self.time = time;
         self.tolerated = tolerated;
         self.first_energy = first_energy;
-        self.largest_ill_posed = ill_posed.unwrap_or(0.0);
+        self.flowed = flowed;
         self.recent_energy = recent_energy;
         self.interest.update(mesh, self.quadrature.composition(), plan.background());
         self.baseline = baseline.to_vec();

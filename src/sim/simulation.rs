@@ -88,9 +88,9 @@ pub struct Simulation<const D: usize> {
     pub(super) last_other_power: f64,
     /// Energy lost and energy dissipated in the last steps, J/m, later steps weighted more.
     pub(super) recent_energy: [f64; 2],
-    /// Largest share so far of the flowing volume of grains that flows at an inertial number outside
-    /// the well-posed range, without an internal length.
-    pub(super) largest_ill_posed: f64,
+    /// Time integrals of volumes, in the plan's units: of the grains that flow at an inertial number
+    /// outside the well-posed range and have no internal length, and of all grains that flow.
+    pub(super) flowed: [f64; 2],
     /// Potential energy at the start, J/m.
     pub(super) first_energy: f64,
     pub(super) row: Row,
@@ -172,7 +172,7 @@ impl<const D: usize> Simulation<D> {
             step: 0,
             baseline: vec![],
             last_other_power: 0.0,
-            largest_ill_posed: 0.0,
+            flowed: [0.0; 2],
             first_energy: 0.0,
             recent_energy: [0.0; 2],
             row: Row::empty(plan.state.materials.len()),

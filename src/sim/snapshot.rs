@@ -87,6 +87,11 @@ fn dye_lines(plan: &Plan, dye: &DyeLines) -> Vec<Vec<[f32; 2]>> {
     dye.wrapped(&plan.mesh).iter().map(|l| l.iter().map(si).collect()).collect()
 }
 
+/// Ends of the colour scale of inertial numbers.
+fn inertial_range(plan: &Plan) -> [f32; 2] {
+    [0.0, plan.halfway_inertial_number().unwrap_or(1.0) as f32]
+}
+
 /// Inertial number of grains; NaN elsewhere.
 fn inertial_number(local: Option<Local>) -> f64 {
     local.and_then(|l| l.inertial_number).unwrap_or(f64::NAN)
@@ -172,7 +177,7 @@ impl<const D: usize> Simulation<D> {
         threads::for_each(&mut values, SAMPLE_GRAIN, |k, v| *v = value(shown[k]) as f32);
         let range = match colour_by {
             ColourBy::Alignment | ColourBy::Yielded => [0.0, 1.0],
-            ColourBy::InertialNumber => self.inertial_range(),
+            ColourBy::InertialNumber => inertial_range(&self.plan),
             ColourBy::Rotation => symmetric(range(&values)),
             _ => range(&values),
         };
@@ -233,7 +238,7 @@ impl<const D: usize> Simulation<D> {
             FieldName::Speed => [0.0, range(&values)[1]],
             FieldName::Rotation => symmetric(range(&values)),
             FieldName::Pressure => range(&values),
-            FieldName::InertialNumber => self.inertial_range(),
+            FieldName::InertialNumber => inertial_range(plan),
             FieldName::Yielded => [0.0, 1.0],
         };
         Some(GridField {

@@ -3,8 +3,7 @@
 
 use super::simulation::Simulation;
 use crate::laws::director::Orientation;
-use crate::laws::flow_curve::{Friction, Strength};
-use crate::plan::material::Material;
+use crate::laws::flow_curve::FlowCurve;
 use crate::solve::last_flow::{Iterate, LastFlow};
 use crate::space::flow::Flow;
 use crate::threads;
@@ -28,14 +27,6 @@ pub(super) struct Local {
     pub(super) ill_posed: bool,
 }
 
-/// Friction of a material, if it has any.
-pub(super) fn friction(material: &Material) -> Option<&Friction> {
-    match material.law.curve.as_ref()?.strength {
-        Strength::Friction(ref friction) => Some(friction),
-        Strength::HerschelBulkley { .. } => None,
-    }
-}
-
 impl<const D: usize> Simulation<D> {
     /// State of the material of a particle at the reference coordinates `r` of a cell; `None` if the
     /// material has no flow curve.
@@ -49,7 +40,7 @@ impl<const D: usize> Simulation<D> {
         let flow = Iterate { mesh: &self.plan.mesh, velocity, pressure }.at(cell, r)?;
         let (g, p) = (material.law.rate(&flow.rates, &orientation), flow.pressure);
         let (viscosity, yields) = (curve.viscosity(g, p).value, curve.yields(g, p));
-        let friction = friction(material);
+        let friction = curve.friction();
         let number = friction.map(|f| if g > 0.0 { f.inertial_number(g, p) } else { 0.0 });
         Some(Local {
             viscosity,
@@ -80,16 +71,15 @@ impl<const D: usize> Simulation<D> {
         self.local(near?.0, cell, r)
     }
 
-    /// Share of the flowing volume of grains in which their inertial number lies outside the
-    /// well-posed range: of all grains, and of those without an internal length.
-    pub(super) fn ill_posed_shares(&self) -> [f64; 2] {
+    /// Volume of flowing grains; of those whose inertial number lies outside the well-posed range; and
+    /// of the latter without an internal length.
+    pub(super) fn ill_posed_volumes(&self) -> [f64; 3] {
         let (mesh, particles) = (&self.plan.mesh, &self.particles);
-        let materials = &self.matter.materials;
-        let [flowing, all, classical] = threads::sum(0..mesh.cells(), |cell| {
+        threads::sum(0..mesh.cells(), |cell| {
             let mut sums = [0.0; 3];
             for p in particles.of_cell(cell) {
-                let material = &materials[usize::from(particles.material[p])];
-                if friction(material).is_none() {
+                let law = &self.matter.materials[usize::from(particles.material[p])].law;
+                if law.curve.as_ref().and_then(FlowCurve::friction).is_none() {
                     continue;
                 }
                 let r = mesh.to_reference(cell, particles.position[p]);
@@ -98,18 +88,10 @@ impl<const D: usize> Simulation<D> {
                 sums[0] += volume;
                 if local.ill_posed {
                     sums[1] += volume;
-                    sums[2] += if material.law.rotation.is_none() { volume } else { 0.0 };
+                    sums[2] += if law.rotation.is_none() { volume } else { 0.0 };
                 }
             }
             sums
-        });
-        [all, classical].map(|v| if flowing > 0.0 { v / flowing } else { 0.0 })
-    }
-
-    /// Ends of the colour scale of inertial numbers: zero and the largest of the inertial numbers at
-    /// which friction is halfway between its limits.
-    pub(super) fn inertial_range(&self) -> [f32; 2] {
-        let halfway = self.matter.materials.iter().filter_map(friction).map(|f| f.inertial_number);
-        [0.0, halfway.fold(0.0, f64::max) as f32]
+        })
     }
 }
