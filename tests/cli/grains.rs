@@ -78,8 +78,10 @@ fn fields_of_grains_are_recorded_and_exported() {
     // Grains fill more than a fifth of the domain, and the field has no value elsewhere.
     let all = fields.numbers("yielded").len();
     assert!(yielded.len() * 5 > all && yielded.len() * 2 < all, "{} {all}", yielded.len());
-    assert!(yielded.iter().all(|&v| v == 0.0 || v == 1.0));
-    assert!(yielded.contains(&1.0));
+    // Exported samples are interpolated between those of the field.
+    let whole = yielded.iter().filter(|v| [0.0, 1.0].contains(v)).count();
+    assert!(yielded.iter().all(|v| (0.0..=1.0).contains(v)));
+    assert!(whole * 10 > yielded.len() * 9 && yielded.contains(&1.0), "{whole}");
     assert_eq!(numbers.len(), yielded.len());
     assert!(numbers.iter().all(|&i| (0.0..=4.01).contains(&i)));
     for field in ["yielded", "inertial_number"] {
