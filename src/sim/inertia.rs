@@ -120,8 +120,6 @@ impl Inertia {
             (None, None) => [1.0, 1.0, 0.0],
         };
         let acceleration = acceleration.as_deref();
-        let densities = plan.state.materials.iter().map(|m| m.density);
-        let least = densities.fold(f64::INFINITY, f64::min);
         let [first, second] = backwards;
         let last_flow = reversed(plan, first, last);
         let before_flow = before.as_ref().map(|b| (b, reversed(plan, second, b)));
@@ -150,8 +148,7 @@ impl Inertia {
                     let u = interpolated(mesh, &before.velocity, two);
                     carried = [carried[0] - a2 * u[0], carried[1] - a2 * u[1]];
                 }
-                // Densities that vary linearly in a cut cell may be negative at its corners.
-                let mass = *unit * volume * point.mass.max(point.weight * least);
+                let mass = *unit * volume * point.mass;
                 for a in 0..NODES {
                     let share = mass * point.n[a];
                     out.load[a][0] += share * carried[0] / last.dt;

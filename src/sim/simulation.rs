@@ -141,6 +141,7 @@ impl<const D: usize> Simulation<D> {
                 &mesh,
                 Neighbours::new(&mesh, &plan.enclosure),
                 plan.state.materials.len(),
+                plan.effects.inertia,
             ),
             velocities: CellVelocities::new(
                 &mesh,

@@ -21,6 +21,10 @@
 //! of a fluid acts where its stiffness is. Distributed linearly over the whole cell, the weight of
 //! the heavy fluid would also drive the thin one.
 //!
+//! With inertia the density is also that of the mass, which must nowhere be negative. A linear share is
+//! negative in a part of a cell whose material lies in a corner, so there the variation of the density
+//! is scaled down until the density is nowhere below that of the lightest material.
+//!
 //! `rho_m` is a quadratic fit if particles carry their density. Particles of neighbouring cells
 //! contribute to the fit with a small weight.
 
@@ -60,6 +64,8 @@ pub struct Density {
     fits: Vec<Fit>,
     /// Density of each material of the cell.
     densities: Vec<Option<Polynomial>>,
+    /// Whether densities lie nowhere below that of the lightest material.
+    bounded: bool,
 }
 
 /// Densities of a cell cut by a straight line, at the points of [`GAUSS_6X6`].
@@ -73,8 +79,6 @@ struct SideDensities {
 
 /// An integration point of the weight.
 pub struct MassPoint<'a> {
-    /// Share of the volume of the cell.
-    pub weight: f64,
     /// Mass divided by the volume of the cell.
     pub mass: f64,
     /// The mass times the function `psi` of the kink of the velocity.
@@ -100,9 +104,15 @@ static FROM_GAUSS: LazyLock<[[f64; 9]; SUBPOINTS]> = LazyLock::new(|| {
     })
 });
 
+/// Value at a point of [`GAUSS_6X6`] of the polynomial with given values at the points of
+/// [`GAUSS_3X3`].
+fn at_fine_point(at_gauss: &[f64; 9], q: usize) -> f64 {
+    FROM_GAUSS[q].iter().zip(at_gauss).map(|(l, d)| l * d).sum()
+}
+
 impl Density {
-    /// Creates zero densities for all cells.
-    pub fn new(mesh: &Mesh, neighbours: Neighbours, materials: usize) -> Self {
+    /// Creates zero densities for all cells. `bounded`: the density is that of a mass.
+    pub fn new(mesh: &Mesh, neighbours: Neighbours, materials: usize, bounded: bool) -> Self {
         Density {
             neighbours,
             at_gauss: vec![[0.0; 9]; mesh.cells()],
@@ -110,6 +120,7 @@ impl Density {
             centroids: Centroids::new(materials),
             fits: vec![Fit::default(); materials],
             densities: Vec::with_capacity(materials),
+            bounded,
         }
     }
 
@@ -136,8 +147,9 @@ impl Density {
                     let fits = self.fits.iter();
                     self.densities.clear();
                     self.densities.extend(fits.map(|f| f.solve(Degree::Quadratic)));
+                    let linear = self.at_gauss(materials);
                     if let Some(sides) = quadrature.cut(cell).and_then(|cut| cut.sides.as_ref()) {
-                        let densities = self.sides(sides, materials);
+                        let densities = self.sides(sides, &linear, materials);
                         self.of_sides[cell] = Some(match kept {
                             Some(mut kept) => {
                                 *kept = densities;
@@ -146,7 +158,7 @@ impl Density {
                             None => Box::new(densities),
                         });
                     }
-                    GAUSS_3X3.each_ref().map(|g| self.linear(g.r, materials))
+                    linear
                 }
                 Content::Solid | Content::Unknown => [0.0; 9],
             };
@@ -170,12 +182,11 @@ impl Density {
             let densities = sides.density.iter().zip(&sides.kinked);
             for ((density, kinked), g) in densities.zip(GAUSS_6X6.iter()) {
                 let [mass, kinked] = [density, kinked].map(|d| g.weight * d);
-                f(MassPoint { weight: g.weight, mass, kinked, r: g.r, n: &g.shape.n });
+                f(MassPoint { mass, kinked, r: g.r, n: &g.shape.n });
             }
         } else {
             for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
-                let (weight, mass) = (g.weight, g.weight * density);
-                f(MassPoint { weight, mass, kinked: 0.0, r: g.r, n: &g.shape.n });
+                f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
             }
         }
     }
@@ -186,10 +197,9 @@ impl Density {
         if self.of_sides[cell].is_some() {
             return self.for_points(cell, f);
         }
-        for (g, at_gauss) in GAUSS_6X6.iter().zip(FROM_GAUSS.iter()) {
-            let density: f64 = at_gauss.iter().zip(&self.at_gauss[cell]).map(|(l, d)| l * d).sum();
-            let (weight, mass) = (g.weight, g.weight * density);
-            f(MassPoint { weight, mass, kinked: 0.0, r: g.r, n: &g.shape.n });
+        for (q, g) in GAUSS_6X6.iter().enumerate() {
+            let density = at_fine_point(&self.at_gauss[cell], q);
+            f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
         }
     }
 
@@ -241,8 +251,27 @@ impl Density {
         density
     }
 
-    /// Densities of a cell cut by a line.
-    fn sides(&self, sides: &Sides, materials: &[Material]) -> SideDensities {
+    /// Densities at the points of [`GAUSS_3X3`] for shares that vary linearly.
+    fn at_gauss(&self, materials: &[Material]) -> [f64; 9] {
+        let linear = GAUSS_3X3.each_ref().map(|g| self.linear(g.r, materials));
+        if !self.bounded {
+            return linear;
+        }
+        let present = (0..materials.len()).filter(|&m| self.centroids.share(m) > 0.0);
+        let lightest =
+            |m: usize| if materials[m].carries_density { 0.0 } else { materials[m].density };
+        let least = present.map(lightest).fold(f64::INFINITY, f64::min);
+        let mean: f64 = linear.iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum();
+        let lowest = (0..SUBPOINTS).map(|q| at_fine_point(&linear, q)).fold(mean, f64::min);
+        if lowest >= least {
+            return linear;
+        }
+        let scale = ((mean - least) / (mean - lowest)).max(0.0);
+        linear.map(|d| mean + scale * (d - mean))
+    }
+
+    /// Densities of a cell cut by a line; `linear`: those for shares that vary linearly.
+    fn sides(&self, sides: &Sides, linear: &[f64; 9], materials: &[Material]) -> SideDensities {
         let trust = sides.cut.trust;
         let mut out = SideDensities { density: [0.0; SUBPOINTS], kinked: [0.0; SUBPOINTS] };
         for (q, g) in GAUSS_6X6.iter().enumerate() {
@@ -250,7 +279,11 @@ impl Density {
             let of = sides.between.map(|m| self.of_material(m, g.r, materials));
             let mass = [(1.0 - share) * of[0], share * of[1]];
             let psi = sides.kinked.as_ref().map_or([0.0; 2], |kinked| kinked.kink.values(g));
-            let rest = if trust < 1.0 { (1.0 - trust) * self.linear(g.r, materials) } else { 0.0 };
+            let rest = match trust < 1.0 {
+                true if self.bounded => (1.0 - trust) * at_fine_point(linear, q),
+                true => (1.0 - trust) * self.linear(g.r, materials),
+                false => 0.0,
+            };
             out.density[q] = trust * (mass[0] + mass[1]) + rest;
             out.kinked[q] = trust * (mass[0] * psi[0] + mass[1] * psi[1]);
         }

@@ -33,8 +33,7 @@ impl<'a> Masses<'a> {
         match self {
             Masses::Fitted(density, _) => density.for_points(cell, f),
             Masses::Points(quadrature) => quadrature.for_points(cell, |p, shape| {
-                let (weight, mass) = (p.weight, p.weight * p.density);
-                f(MassPoint { weight, mass, kinked: 0.0, r: p.r, n: &shape.n })
+                f(MassPoint { mass: p.weight * p.density, kinked: 0.0, r: p.r, n: &shape.n })
             }),
         }
     }
