@@ -2,7 +2,9 @@
 //! expected orders of convergence. Tests and commands measure all cases with the same functions.
 
 mod cosserat;
+mod flow_curves;
 mod inclined;
+pub mod inertia;
 mod layers;
 mod measure;
 mod of_scene;
@@ -15,6 +17,7 @@ mod solvi;
 mod vortex;
 
 pub use cosserat::{Fluid, couette, coupled_cell, poiseuille};
+pub use flow_curves::{Channel, Unidirectional, bagnold, channel, chute};
 pub use inclined::{Inclined, inclined_pure_shear, inclined_shear};
 pub use layers::{Wave, layer_stack, layered_cell};
 pub use measure::{CaseError, Errors, plan_of, start};

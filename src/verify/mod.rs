@@ -7,7 +7,9 @@
 mod corners;
 mod cut_cells;
 mod elements;
+mod flow_curves;
 mod free_surfaces;
+mod inertia;
 mod layers;
 mod rayleigh_taylor;
 mod report;
@@ -43,7 +45,7 @@ impl Effort {
 type Subject = fn(Effort) -> Result<Section, CaseError>;
 
 /// All subjects: name on the command line, and function.
-pub const SUBJECTS: [(&str, Subject); 10] = [
+pub const SUBJECTS: [(&str, Subject); 12] = [
     ("elements", elements::section),
     ("smooth", smooth::section),
     ("cut-cells", cut_cells::section),
@@ -54,6 +56,8 @@ pub const SUBJECTS: [(&str, Subject); 10] = [
     ("corners", corners::section),
     ("layers", layers::section),
     ("texture", texture::section),
+    ("flow-curves", flow_curves::section),
+    ("inertia", inertia::section),
 ];
 
 /// Verifies the subjects with the given names, in the order of [`SUBJECTS`]. `announce` is called

@@ -53,6 +53,14 @@ fn layers() {
 fn texture() {
     check("texture");
 }
+#[test]
+fn flow_curves() {
+    check("flow-curves");
+}
+#[test]
+fn inertia() {
+    check("inertia");
+}
 
 #[test]
 fn every_subject_is_tested() {
