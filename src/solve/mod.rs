@@ -11,6 +11,7 @@ pub mod last_flow;
 pub mod matrices;
 pub mod multifrontal;
 pub mod nonlinear;
+mod particle_points;
 pub mod points;
 mod problem;
 pub mod quadrature;
