@@ -30,7 +30,14 @@ _MATERIALS = ("world/particles", "Points2D:class_ids")
 _STRIPS = "LineStrips2D:strips"
 
 # Recordings contain no units.
-_UNITS = {"speed": "m/s", "rotation": "1/s", "pressure": "Pa", "alignment": "", "inertial_number": "", "yielded": ""}
+_UNITS = {
+    "speed": "m/s",
+    "rotation": "1/s",
+    "pressure": "Pa",
+    "alignment": "",
+    "inertial_number": "",
+    "yielded": "",
+}
 
 
 @dataclass(frozen=True, eq=False)
