@@ -4,6 +4,8 @@ mod alignment;
 mod dynamics;
 mod effects;
 mod exact;
+mod grains;
+mod inertia;
 mod laws;
 mod measure;
 mod openings;

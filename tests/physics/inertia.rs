@@ -1,0 +1,99 @@
+//! Inertia: uniform motion, resumed runs, and the limit of creeping flow. Motions that are known
+//! exactly are those of `verify`.
+
+use crate::{finish, scene};
+use grainscope::sim::Run;
+
+/// A heavy drop and light fluid that move together through a periodic box.
+const UNIFORM: &str = r#"schema = 1
+name = "uniform"
+inertia = true
+[domain]
+x = [0, 1]
+y = [0, 1]
+[accuracy]
+cells = 8
+[time]
+end = 0.5
+max_step = 0.05
+tolerance = 1
+courant = 10
+[materials.light]
+density = 0.1
+shear_viscosity = 0.01
+[materials.heavy]
+density = 1
+shear_viscosity = 0.1
+[[regions]]
+material = "light"
+[[regions]]
+material = "heavy"
+shape.circle = { centre = [0.4, 0.5], radius = 0.22 }
+[initial_velocity]
+x = 1
+y = 0.5
+[boundaries]
+left.kind = "periodic"
+right.kind = "periodic"
+bottom.kind = "periodic"
+top.kind = "periodic"
+"#;
+
+#[test]
+fn a_uniform_motion_stays_uniform() {
+    let mut run = scene(UNIFORM, &[]);
+    finish(run.as_mut(), |run| {
+        for k in 0..20 {
+            let at = [0.618, 0.37].map(|s| (k as f64 * s) % 1.0);
+            let [u, v, _] = run.velocity_at(at);
+            let off = (u - 1.0).abs().max((v - 0.5).abs());
+            assert!(off < 1e-10, "t = {}, {at:?}: {u} {v}", run.row().time);
+        }
+    });
+}
+
+#[test]
+fn a_resumed_run_equals_the_uninterrupted_one() {
+    // Gravity stirs the fluids.
+    let sets = [
+        "gravity=[0.3,-1]",
+        "boundaries.bottom.kind=\"no_slip\"",
+        "boundaries.top.kind=\"no_slip\"",
+    ];
+    let mut whole = scene(UNIFORM, &sets);
+    for _ in 0..3 {
+        whole.step().unwrap();
+    }
+    let state = whole.state();
+    let mut resumed = scene(UNIFORM, &sets);
+    resumed.restore(&state).unwrap();
+    for _ in 0..3 {
+        whole.step().unwrap();
+        resumed.step().unwrap();
+    }
+    assert_eq!(whole.state_hash(), resumed.state_hash());
+    for at in [[0.4, 0.5], [0.1, 0.9], [0.7, 0.3]] {
+        assert_eq!(whole.velocity_at(at), resumed.velocity_at(at));
+    }
+    assert_eq!(whole.row().kinetic_energy, resumed.row().kinetic_energy);
+}
+
+#[test]
+fn a_flow_without_inertia_has_no_momentum() {
+    let text = UNIFORM
+        .replace("inertia = true\n", "gravity = [0, -1]\n")
+        .replace("[initial_velocity]\nx = 1\ny = 0.5\n", "")
+        .replace("bottom.kind = \"periodic\"", "bottom.kind = \"no_slip\"")
+        .replace("top.kind = \"periodic\"", "top.kind = \"no_slip\"");
+    let creeping = scene(&text, &[]);
+    assert_eq!(creeping.row().kinetic_energy, 0.0);
+    // Very stiff fluids with inertia creep after a short step.
+    let stiff = ["materials.light.shear_viscosity=1e4", "materials.heavy.shear_viscosity=1e4"];
+    let mut slow = scene(&text.replace("gravity =", "inertia = true\ngravity ="), &stiff);
+    let creeping = scene(&text, &stiff);
+    let speed = |run: &dyn Run| run.velocity_at([0.4, 0.5])[1];
+    slow.step().unwrap();
+    slow.step().unwrap();
+    let [a, b] = [speed(&*slow), speed(&*creeping)];
+    assert!(b < 0.0 && (a / b - 1.0).abs() < 1e-2, "{a} {b}");
+}
