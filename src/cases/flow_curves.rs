@@ -119,7 +119,9 @@ pub fn bagnold(degrees: f64) -> Unidirectional {
 /// ```text
 /// m = rho g x/p0,   du/dx = -(I_0/d) sqrt(p0/rho_s) (m - mu_s)/(mu_2 - m) for m > mu_s, else 0
 /// ```
-/// The discharge is that of both halves. `internal_length` above zero: a Cosserat material with
+/// The discharge is that of both halves. The largest viscosity is 1e4, since its default follows from
+/// the height of the material, here that of four cells.
+/// `internal_length` above zero: a Cosserat material with
 /// `eta_c = eta` and no rotation at the walls; its exact flow is not known in closed form, and `exact`
 /// is that without internal length.
 pub fn chute(p0: f64, internal_length: f64) -> Unidirectional {
@@ -131,7 +133,7 @@ pub fn chute(p0: f64, internal_length: f64) -> Unidirectional {
     let first =
         FAST * rise * log - 0.5 * (wall * wall - AT_REST * AT_REST) - rise * (wall - AT_REST);
     let body = scene(
-        &format!("{}internal_length = {internal_length:?}", grains()),
+        &format!("{}largest_viscosity = 1e4\ninternal_length = {internal_length:?}", grains()),
         "[-1, 1]",
         "[0, {period}]",
     );
