@@ -273,7 +273,7 @@ impl Evaluation<'_> {
         let (mut matrix, kinked) = if between.into_iter().any(flows) {
             let laws = std::array::from_fn(|q| {
                 let g = &GAUSS_6X6[q];
-                let shares = [1.0 - cut.share[q], cut.share[q]];
+                let shares = sides::bounded(cut.share[q]);
                 [0, 1].map(|side| {
                     let (m, share) = (between[side], shares[side]);
                     let eta = self.viscosity(m, g.r, scratch);

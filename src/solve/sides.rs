@@ -159,7 +159,7 @@ pub fn matrix(
     cell: CellMeasure,
     ramp: Option<Ramp>,
 ) -> (VelocityMatrix, Option<Kinked>) {
-    let mut k = integrated(cut, |_| laws, cell);
+    let mut k = integrated(cell, |q| ([1.0 - cut.share[q], cut.share[q]], laws));
     let kinked = ramp.and_then(|ramp| {
         let mut kinked = Kinked::new(cut.line, ramp, cell);
         kinked.eliminate(cut, laws, cell, &mut k).then_some(kinked)
@@ -175,23 +175,30 @@ pub fn varying(
     laws: &[[PointLaw; 2]; SUBPOINTS],
     cell: CellMeasure,
 ) -> VelocityMatrix {
-    let mut k = integrated(cut, |q| &laws[q], cell);
+    let mut k = integrated(cell, |q| (bounded(cut.share[q]), &laws[q]));
     symmetrize(&mut k);
     k
 }
 
-/// Integral over both sides with the laws of the two materials at each point.
+/// Shares of the two sides at a point, between zero and one. Shares that integrate polynomials
+/// exactly are slightly outside, where viscosities that vary within a side would make the matrix
+/// indefinite.
+pub fn bounded(share: f64) -> [f64; 2] {
+    let share = share.clamp(0.0, 1.0);
+    [1.0 - share, share]
+}
+
+/// Integral over both sides, with the shares and the laws of the two materials at each point.
 fn integrated<'a>(
-    cut: &StraightCut,
-    laws: impl Fn(usize) -> &'a [PointLaw; 2],
     cell: CellMeasure,
+    at: impl Fn(usize) -> ([f64; 2], &'a [PointLaw; 2]),
 ) -> VelocityMatrix {
     let mut k: VelocityMatrix = [[0.0; 2 * NODES]; 2 * NODES];
-    for (q, (g, &share)) in GAUSS_6X6.iter().zip(&cut.share).enumerate() {
-        let laws = laws(q);
+    for (q, g) in GAUSS_6X6.iter().enumerate() {
+        let ([first, second], laws) = at(q);
         let mut mixture = Mixture::parallel();
-        mixture.add(1.0 - share, &laws[0]);
-        mixture.add(share, &laws[1]);
+        mixture.add(first, &laws[0]);
+        mixture.add(second, &laws[1]);
         let (s, law) = (PointShape::new(&g.shape, cell.size), mixture.law());
         for (i, row) in k.iter_mut().enumerate() {
             let slope = [s.gx[i % NODES], s.gy[i % NODES]];
