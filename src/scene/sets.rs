@@ -8,11 +8,13 @@ use super::load::table;
 use super::source::SceneSource;
 
 /// The keys of a scene with which a path may start.
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 24] = [
     "schema",
     "name",
     "description",
     "gravity",
+    "inertia",
+    "initial_velocity",
     "parameters",
     "domain",
     "mesh",
@@ -23,6 +25,7 @@ const KEYS: [&str; 21] = [
     "boundaries",
     "walls",
     "blocks",
+    "pressure_reference",
     "body_force",
     "acceleration",
     "gauges",

@@ -69,6 +69,8 @@ pub struct Quadrature {
     pub(super) softened: bool,
     /// Volume factors of the materials in the last update.
     factors: Vec<f64>,
+    /// Whether each cell is evaluated.
+    chosen: Vec<bool>,
 }
 
 impl Quadrature {
@@ -101,6 +103,7 @@ impl Quadrature {
             directions: vec![],
             softened: true,
             factors: vec![],
+            chosen: vec![],
         }
     }
 
@@ -324,9 +327,11 @@ impl Quadrature {
             compliance,
             softening,
             factors,
+            chosen,
             ..
         } = self;
-        let chosen: Vec<bool> = (0..mesh.cells()).map(|cell| selected(composition, cell)).collect();
+        chosen.clear();
+        chosen.extend((0..mesh.cells()).map(|cell| selected(composition, cell)));
         // The volume fractions are written while the rest of the composition is read.
         let mut fractions = std::mem::take(&mut composition.fractions);
         let from = Evaluation {

@@ -16,14 +16,14 @@ pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<Clock
         return Err(SceneError::of_key(
             "time.courant",
             format!("time.courant is {}", t.courant),
-            "cells crossed per step: above 0, at most 50; 0.5 is usual",
+            "cells crossed per step: above 0, at most 50; 2 is usual",
         ));
     }
     if !(t.tolerance > 0.0 && t.tolerance <= 1.0) {
         return Err(SceneError::of_key(
             "time.tolerance",
             format!("time.tolerance is {}", t.tolerance),
-            "displacement error per step in cells: above 0, at most 1; 0.01 is usual",
+            "displacement error per step in cells: above 0, at most 1; 0.1 is usual",
         ));
     }
     if !(t.strain > 0.0 && t.strain <= 10.0) {
