@@ -346,18 +346,6 @@ columns! {
     };
     /// Number of solver corrections, summed over the solutions of the step.
     iterations: u32 = |m| m.iterations, 0, { label: "iterations" };
-    /// Number of iterations for friction, yield stresses and power laws, in the solution at the end of
-    /// the step.
-    nonlinear_iterations: u32 = |m| m.nonlinear, 0, {
-        label: "nonlinear iterations", exists: |p| p.effects.flow_curves,
-    };
-    /// Share of the flowing volume of grains with friction whose inertial number lies outside the
-    /// range in which the equations without an internal length are well posed. Material at rest and
-    /// material at a bound of its viscosity do not count; 0 if nothing flows.
-    ill_posed_share: f64 = |m| m.ill_posed_share, 0.0, {
-        label: "ill-posed share", path: "diagnostics/ill_posed_share",
-        exists: Plan::has_friction,
-    };
     /// Number of particles.
     particles: usize = |m| m.particles.len(), 0, { label: "particles", rank: Rank::Value(11) };
     /// Largest speed at a node.
@@ -413,6 +401,18 @@ columns! {
     merges: u64 = |m| m.count.merges, 0, { label: "merges", rank: Rank::Never };
     /// Number of times that a wall stopped a particle since the start.
     held: u64 = |m| m.count.held, 0, { label: "held at walls", rank: Rank::Never };
+    /// Number of iterations for friction, yield stresses and power laws, in the solution at the end of
+    /// the step.
+    nonlinear_iterations: u32 = |m| m.nonlinear, 0, {
+        label: "nonlinear iterations", exists: |p| p.effects.flow_curves,
+    };
+    /// Share of the flowing volume of grains with friction whose inertial number lies outside the
+    /// range in which the equations without an internal length are well posed. Material at rest and
+    /// material at a bound of its viscosity do not count; 0 if nothing flows.
+    ill_posed_share: f64 = |m| m.ill_posed_share, 0.0, {
+        label: "ill-posed share", path: "diagnostics/ill_posed_share",
+        exists: Plan::has_friction,
+    };
     /// Volume mean of |n_x| over layered particles; absent without directors.
     mean_alignment: Option<f64> = |m| mean_alignment(m.particles, m.materials), None, {
         symbol: "|n_x|", label: "mean |n_x|", rank: Rank::Compared(2), path: "texture/alignment",
