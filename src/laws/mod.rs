@@ -121,6 +121,12 @@ pub struct Softening {
 }
 
 impl Softening {
+    /// The derivative without the stresses of the rotation.
+    pub fn of_shear(mut self) -> Self {
+        (self.unit.coupling, self.unit.couple) = (0.0, 0.0);
+        self
+    }
+
     /// The larger of the rate and the yield rate.
     pub fn effective_rate(&self) -> f64 {
         self.rate.max(self.yield_rate)
@@ -144,30 +150,29 @@ impl Law {
 
     /// The linear law at an integration point: the stress divided by the rates.
     pub fn at(&self, here: &Here) -> PointLaw {
-        match (&self.curve, here.flow) {
-            (None, _) => self.of_viscosity(here.viscosity, here.orientation),
-            (Some(_), None) => self.unit(here.orientation).scaled(here.viscosity),
-            (Some(curve), Some(flow)) => {
-                let unit = self.unit(here.orientation);
-                let g = unit.power(&flow.rates).sqrt();
-                unit.scaled(curve.viscosity(g, flow.pressure).value)
-            }
-        }
+        self.with_softening(here).0
     }
 
-    /// Derivative of the stress that [`Law::at`] leaves out; `None` if the law does not depend on the
-    /// flow or no flow is known.
-    pub fn softening(&self, here: &Here) -> Option<Softening> {
-        let (curve, flow) = (self.curve.as_ref()?, here.flow?);
+    /// The linear law at an integration point, and the derivative of the stress that it leaves out;
+    /// `None` if the law does not depend on the flow or no flow is known.
+    pub fn with_softening(&self, here: &Here) -> (PointLaw, Option<Softening>) {
+        let Some(curve) = &self.curve else {
+            return (self.of_viscosity(here.viscosity, here.orientation), None);
+        };
         let unit = self.unit(here.orientation);
-        let g = unit.power(&flow.rates).sqrt();
-        Some(Softening {
-            slope: curve.viscosity(g, flow.pressure).slope,
+        let Some(LocalFlow { rates, pressure }) = here.flow else {
+            return (unit.scaled(here.viscosity), None);
+        };
+        let rate = unit.power(&rates).sqrt();
+        let viscosity = curve.viscosity(rate, pressure);
+        let softening = Softening {
+            slope: viscosity.slope,
             unit: unit.without_excess(),
-            rates: flow.rates,
-            rate: g,
-            yield_rate: curve.yield_rate(flow.pressure),
-        })
+            rates,
+            rate,
+            yield_rate: curve.yield_rate(pressure),
+        };
+        (unit.scaled(viscosity.value), Some(softening))
     }
 
     /// Rate `g` of a generalised fluid, 1/s.

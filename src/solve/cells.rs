@@ -3,8 +3,7 @@
 
 use super::points::{CutStiffness, IntegrationPoint, Place};
 use super::softening::SofteningPoint;
-use crate::laws::Here;
-use crate::plan::material::Material;
+use crate::laws::Softening;
 use crate::threads::Divisible;
 
 /// Mutable data of consecutive cells.
@@ -42,24 +41,10 @@ pub struct CellMut<'a> {
 }
 
 impl CellMut<'_> {
-    /// Adds the derivative of the viscosity of a material at a point.
-    pub fn soften(&mut self, place: Place, weight: f64, material: &Material, here: &Here) {
-        if let (Some(list), Some(softening)) = (&mut self.softening, material.law.softening(here)) {
+    /// Adds the derivative of the viscosity of a material at a point, if there is one.
+    pub fn soften(&mut self, place: Place, weight: f64, softening: Option<Softening>) {
+        if let (Some(list), Some(softening)) = (&mut self.softening, softening) {
             list.push(SofteningPoint { place, weight, softening });
-        }
-    }
-}
-
-impl CellMut<'_> {
-    /// [`CellMut::soften`] without the stresses of the rotation, which the integration points of a
-    /// cut cell have.
-    pub fn soften_shear(&mut self, place: Place, weight: f64, material: &Material, here: &Here) {
-        self.soften(place, weight, material, here);
-        if let Some(last) = self.softening.as_mut().and_then(|list| list.last_mut())
-            && last.place == place
-        {
-            let unit = &mut last.softening.unit;
-            (unit.coupling, unit.couple) = (0.0, 0.0);
         }
     }
 }

@@ -9,10 +9,10 @@ use super::sides::{self, Sides};
 use crate::composition::interface::Interface;
 use crate::composition::straight::StraightCut;
 use crate::composition::{Content, Gathered, Kind};
-use crate::laws::Here;
 use crate::laws::director::Orientation;
 use crate::laws::mixture::Mixture;
 use crate::laws::point::PointLaw;
+use crate::laws::{Here, Softening};
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
 use crate::space::kink::Ramp;
@@ -99,10 +99,10 @@ impl Evaluation<'_> {
         for g in 0..9 {
             let (r, weight) = (out.points[g].r, out.points[g].weight);
             let here = self.here((cell, r), m, material.viscosity, &orientation);
-            let law = material.law.at(&here);
+            let (law, softening) = material.law.with_softening(&here);
             out.points[g].law = law;
             *out.mean_viscosity += weight * law.shear.mean();
-            out.soften(Place::Gauss(g as u8), weight, material, &here);
+            out.soften(Place::Gauss(g as u8), weight, softening);
         }
     }
 
@@ -278,11 +278,13 @@ impl Evaluation<'_> {
                     let (m, share) = (between[side], shares[side]);
                     let eta = self.viscosity(m, g.r, scratch);
                     let here = self.here((cell, g.r), m, eta, scratch.cell_orientation(m));
-                    if flows(m) && share > 0.0 {
-                        let weight = g.weight * share * cut.trust;
-                        out.soften_shear(Place::Fine(q as u8), weight, &self.materials[m], &here);
+                    let (law, softening) = self.materials[m].law.with_softening(&here);
+                    if share > 0.0 {
+                        // The integration points have the stresses of the rotation.
+                        let softening = softening.map(Softening::of_shear);
+                        out.soften(Place::Fine(q as u8), g.weight * share * cut.trust, softening);
                     }
-                    self.materials[m].law.at(&here)
+                    law
                 })
             });
             (sides::varying(&cut, &laws, measure), None)
@@ -340,11 +342,12 @@ impl Evaluation<'_> {
                 }
                 let eta = self.viscosity(m, r, scratch);
                 let here = self.here((cell, r), m, eta, scratch.orientation(m, g));
-                mixture.add(phi, &material.law.at(&here));
+                let (law, softening) = material.law.with_softening(&here);
+                mixture.add(phi, &law);
                 out.fractions[m] += weight * phi;
                 *out.compliance += weight * phi * material.law.compliance;
                 if softened > 0.0 {
-                    out.soften(Place::Gauss(g as u8), weight * phi * softened, material, &here);
+                    out.soften(Place::Gauss(g as u8), weight * phi * softened, softening);
                 }
             }
             let law = mixture.law();

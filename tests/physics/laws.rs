@@ -315,7 +315,8 @@ fn the_derivative_of_a_flow_curve_is_that_of_the_stress_and_is_positive() {
             let (r, pressure) = (Vector6::from(SOME), 5.0);
             let flow = Some(LocalFlow { rates: rates_of(&r), pressure });
             let here = Here { flow, ..Here::without_flow(1.0, &orientation) };
-            let (point, softening) = (law.at(&here), law.softening(&here).expect("it flows"));
+            let (point, softening) = law.with_softening(&here);
+            let softening = softening.expect("it flows");
             let e = softening.unit.stress(&rates_of(&r), 1.0);
             let factor = softening.slope / softening.rate;
             let e = [e.deviator[0], e.deviator[1], e.mean, e.skew, e.couple[0], e.couple[1]];
