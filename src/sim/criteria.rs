@@ -37,8 +37,8 @@ pub struct Criteria {
     pub margin: f64,
 }
 
-/// Share of the flowing grains, mean over a run, above which a run warns that they flow where the law of friction alone
-/// is ill-posed.
+/// Share of the flowing grains, mean over a run, above which a run warns that they flow where the
+/// law of friction alone is ill-posed.
 pub const ILL_POSED: f64 = 0.05;
 
 /// Number of steps after which the energy balance is checked: the energy of a few steps is

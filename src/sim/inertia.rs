@@ -10,16 +10,16 @@
 //! (backward differentiation of second order on steps of different lengths) the flow at the end of
 //! a step balances the forces there, so stiff material is damped as it should be. The first step
 //! takes the mean of the accelerations at its ends, `rho (2 u - 2 u_1 - dt du_1/dt)/dt`. After a
-//! sudden change of the materials, a step is of first order, `rho (u - u_1)/dt`. The velocities are biquadratic and are tested against the
-//! shape functions, which is third order in space, and no particle carries momentum: splits, merges
-//! and refills cannot change it. O. Pironneau, "On the transport-diffusion algorithm", Numer. Math.
-//! 38 (1982) 309.
+//! sudden change of the materials, a step is of first order, `rho (u - u_1)/dt`. The velocities are
+//! biquadratic and are tested against the shape functions, which is third order in space, and no
+//! particle carries momentum: splits, merges and refills cannot change it. O. Pironneau, "On the
+//! transport-diffusion algorithm", Numer. Math. 38 (1982) 309.
 
 use crate::motion::frozen_flow::{CellVelocities, Displacement, FrozenFlow};
 use crate::plan::Plan;
 use crate::solve::density::Density;
 use crate::solve::terms::inertia::{Inertia as Term, Mass};
-use crate::space::flow::interpolate;
+use crate::space::flow::{Flow, interpolate};
 use crate::space::mesh::{Axis, Mesh};
 use crate::space::shape::{GAUSS_6X6, NODES, Shape};
 use crate::threads;
@@ -205,4 +205,18 @@ fn end(mesh: &Mesh, way: &Displacement) -> (usize, [f64; 2]) {
 fn interpolated(mesh: &Mesh, nodal: &[[f64; 2]], (cell, at): (usize, [f64; 2])) -> [f64; 2] {
     let r = mesh.to_reference(cell, at).map(|r| r.clamp(-1.0, 1.0));
     interpolate(&mesh.cell_nodes(cell).map(|n| nodal[n]), &Shape::values(r))
+}
+
+/// Twice the kinetic energy, `integral rho u . u`; zero without inertia.
+pub fn twice_kinetic<const D: usize>(mesh: &Mesh, term: &Term, flow: &Flow<D>) -> f64 {
+    if term.mass.is_empty() {
+        return 0.0;
+    }
+    let [sum] = threads::sum(0..mesh.cells(), |cell| {
+        if mesh.solid[cell] {
+            return [0.0];
+        }
+        [term.square(cell, &flow.of_cell(mesh, cell).map(|u| [u[0], u[1]]))]
+    });
+    sum
 }

@@ -2,10 +2,10 @@
 
 use super::clock::{Limiter, Speeds};
 use super::criteria::ACCURATE_ENERGY;
+use super::inertia::twice_kinetic;
 use super::phases::Phases;
 use super::row::{GaugeRow, Measured, Row};
 use super::simulation::Simulation;
-use super::solution::twice_kinetic;
 use crate::solve::element::{PointShape, rates};
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;

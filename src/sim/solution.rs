@@ -3,72 +3,20 @@
 
 use super::Integrator;
 use super::error::SimError;
-use super::inertia::Past;
+use super::inertia::{Past, twice_kinetic};
 use super::phases::Phases;
 use super::simulation::Simulation;
-use crate::plan::material::Material;
 use crate::solve::last_flow::{Iterate, LastFlow, NoFlow};
-use crate::solve::nonlinear;
+use crate::solve::nonlinear::Matter;
 use crate::solve::report::{SolveError, Stopping};
 use crate::solve::stokes::Loads;
-use crate::solve::terms::inertia::Inertia;
 use crate::solve::terms::restoring::Ahead;
 use crate::solve::terms::weight::{Masses, add_acceleration, add_gravity};
 use crate::space::flow::Flow;
-use crate::space::mesh::Mesh;
-use crate::threads;
 use std::time::Instant;
 
-/// Number of times that the laws take a new pressure in a step.
-const UPDATES: u32 = 1;
 /// Length of the step from rest to the first flow with inertia, in units of time or of the run.
 const IMPULSE: f64 = 1e-6;
-/// Tolerance of the flows of the softer materials from which a first flow starts.
-const ROUGH: f64 = 0.1;
-/// Factor between their largest viscosities.
-const STAGE: f64 = 10.0;
-
-/// Materials whose largest viscosities rise from a little above the nominal ones by a factor of ten
-/// each: their flows lead from that of the nominal viscosities to that of the materials. From the
-/// former alone, the iteration is slow where material is at rest.
-fn softer(materials: &[Material]) -> Vec<Vec<Material>> {
-    let mut out = Vec::new();
-    let mut factor = STAGE;
-    loop {
-        let mut softened = false;
-        let stage = materials.iter().cloned().map(|mut m| {
-            if let Some(curve) = &mut m.law.curve
-                && factor * m.viscosity < curve.largest
-            {
-                curve.largest = factor * m.viscosity;
-                softened = true;
-            }
-            m
-        });
-        let stage = stage.collect();
-        if !softened {
-            return out;
-        }
-        out.push(stage);
-        factor *= STAGE;
-    }
-}
-
-/// Twice the kinetic energy, `integral rho u . u`.
-pub(super) fn twice_kinetic<const D: usize>(mesh: &Mesh, inertia: &Inertia, flow: &Flow<D>) -> f64 {
-    if inertia.mass.is_empty() {
-        return 0.0;
-    }
-    let [sum] = threads::sum(0..mesh.cells(), |cell| {
-        if mesh.solid[cell] {
-            return [0.0];
-        }
-        let nodal = mesh.cell_nodes(cell).map(|n| flow.velocity[n]);
-        [inertia.square(cell, &nodal.map(|u| [u[0], u[1]]))]
-    });
-    sum
-}
-
 impl<const D: usize> Simulation<D> {
     /// Solves for the flow at the current particle positions. `restoring`: the time ahead for which
     /// restoring loads are computed, and the previous flow.
@@ -107,27 +55,13 @@ impl<const D: usize> Simulation<D> {
         let Simulation { stokes, quadrature, particles, matter, flow, .. } = self;
         let failed =
             |s: SolveError| SimError::Solve { step, time, source: s.scaled(plan.units.length) };
-        if !known || !nonlinear {
-            self.report = stokes.solve(quadrature, loads, stopping, flow).map_err(failed)?;
-        }
-        if nonlinear {
-            // In a step, the pressure is extrapolated from earlier ones.
-            let updates = if known { UPDATES } else { u32::MAX };
-            let mut solve = |materials: &[Material], stopping| {
-                let matter = nonlinear::Matter { particles, materials };
-                stokes.solve_nonlinear(quadrature, matter, loads, (stopping, updates), flow)
-            };
-            let (mut iterations, mut corrections) = (0, 0);
-            for materials in if known { vec![] } else { softer(&matter.materials) } {
-                let rough = Stopping { nonlinear: ROUGH, ..stopping };
-                let report = solve(&materials, rough).map_err(failed)?;
-                iterations += report.iterations;
-                corrections += report.corrections;
-            }
-            self.report = solve(&matter.materials, stopping).map_err(failed)?;
-            self.report.iterations += iterations;
-            self.report.corrections += corrections;
-        }
+        let solved = if nonlinear {
+            let matter = Matter { particles, materials: &matter.materials };
+            stokes.solve_nonlinear(quadrature, matter, loads, stopping, (flow, known))
+        } else {
+            stokes.solve(quadrature, loads, stopping, flow)
+        };
+        self.report = solved.map_err(failed)?;
         self.separate_inertia();
         seconds.assemble += self.report.seconds.assemble;
         seconds.factor += self.report.seconds.factor;

@@ -47,6 +47,13 @@ const DIVERGENCE: f64 = 1e-8;
 /// Dissipation below this share of the scale of power is that of a scene at rest.
 const REST: f64 = 1e-9;
 
+/// Number of times that the laws take a new pressure in a step.
+const UPDATES: u32 = 1;
+/// Tolerance of the flows of the softer materials from which a first flow starts.
+const ROUGH: f64 = 0.1;
+/// Factor between their largest viscosities.
+const STAGE: f64 = 10.0;
+
 /// The particles and materials that determine the laws.
 #[derive(Clone, Copy)]
 pub struct Matter<'a> {
@@ -63,10 +70,36 @@ fn blend(old: &mut [[f64; 3]], share: f64, new: &[[f64; 3]]) {
     }
 }
 
+/// Materials whose largest viscosities rise from a little above the nominal ones by a factor of ten
+/// each: their flows lead from that of the nominal viscosities to that of the materials. From the
+/// former alone, the iteration is slow where material is at rest.
+fn softer(materials: &[Material]) -> Vec<Vec<Material>> {
+    let mut out = Vec::new();
+    let mut factor = STAGE;
+    loop {
+        let mut softened = false;
+        let stage = materials.iter().cloned().map(|mut m| {
+            if let Some(curve) = &mut m.law.curve
+                && factor * m.viscosity < curve.largest
+            {
+                curve.largest = factor * m.viscosity;
+                softened = true;
+            }
+            m
+        });
+        let stage = stage.collect();
+        if !softened {
+            return out;
+        }
+        out.push(stage);
+        factor *= STAGE;
+    }
+}
+
 impl<const D: usize> Stokes<D> {
-    /// Solves for the flow of generalised fluids. `most_updates`: largest number of times that the
-    /// laws take the pressure of an iterate. `flow` holds the initial guess; `quadrature` was
-    /// updated with the same particles and materials.
+    /// Solves for the flow of generalised fluids. `flow` holds the initial guess if it is `known`;
+    /// otherwise the flow of the nominal viscosities, with which `quadrature` was updated, leads to
+    /// the solution. `quadrature` was updated with the same particles and materials.
     ///
     /// # Errors
     /// [`SolveError`] if a matrix is not positive definite, the iteration does not converge, or the
@@ -76,7 +109,35 @@ impl<const D: usize> Stokes<D> {
         quadrature: &mut Quadrature,
         matter: Matter,
         loads: Loads<D>,
-        (stopping, most_updates): (Stopping, u32),
+        stopping: Stopping,
+        (flow, known): (&mut Flow<D>, bool),
+    ) -> Result<Report, SolveError> {
+        if known {
+            // In a step, the pressure is extrapolated from earlier ones.
+            return self.iterated(quadrature, matter, (loads, stopping, UPDATES), flow);
+        }
+        self.solve(quadrature, loads, stopping, flow)?;
+        let rough = Stopping { nonlinear: ROUGH, ..stopping };
+        let (mut iterations, mut corrections) = (0, 0);
+        for materials in softer(matter.materials) {
+            let softer = Matter { materials: &materials, ..matter };
+            let report = self.iterated(quadrature, softer, (loads, rough, u32::MAX), flow)?;
+            iterations += report.iterations;
+            corrections += report.corrections;
+        }
+        let mut report = self.iterated(quadrature, matter, (loads, stopping, u32::MAX), flow)?;
+        report.iterations += iterations;
+        report.corrections += corrections;
+        Ok(report)
+    }
+
+    /// Iterates from the flow. `most_updates`: largest number of times that the laws take the
+    /// pressure of an iterate.
+    fn iterated(
+        &mut self,
+        quadrature: &mut Quadrature,
+        matter: Matter,
+        (loads, stopping, most_updates): (Loads<D>, Stopping, u32),
         flow: &mut Flow<D>,
     ) -> Result<Report, SolveError> {
         let mut report = Report::default();
@@ -121,7 +182,7 @@ impl<const D: usize> Stokes<D> {
                 match last {
                     None => {
                         quadrature.align();
-                        self.assemble(quadrature, loads.terms);
+                        report.active_rotation = self.assemble(quadrature, loads.terms);
                     }
                     Some((share, _)) => quadrature.turn(share),
                 }

@@ -67,7 +67,7 @@ impl Surroundings {
 }
 
 /// Whether a key that only generalised fluids have is given.
-pub(super) fn is_generalised(m: &scene::Material) -> bool {
+fn is_generalised(m: &scene::Material) -> bool {
     m.friction.is_some() || m.yield_stress.is_some() || m.flow_index.is_some()
 }
 
