@@ -265,7 +265,7 @@ impl Plan {
                     "more than one density in gravity: accuracy.stabilisation = {}",
                     stabilised.unwrap_or(0.0)
                 ),
-                "no gravity, a single density, or accuracy.stabilisation = 0",
+                "no gravity, a single density, inertia, or accuracy.stabilisation = 0",
             ),
             0,
             0,
