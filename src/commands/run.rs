@@ -163,7 +163,7 @@ fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
     let until = Quantity::expression(text).eval(&scope).map_err(|e| {
         Failure::Usage(format!("--until {text}: {}; give a time in seconds", e.message()))
     })?;
-    let end = scene.time.end.eval(&scope).map_err(|e| e.with_source(source))?;
+    let end = scene.time.end().and_then(|q| q.eval(&scope)).map_err(|e| e.with_source(source))?;
     if !(until > 0.0 && until <= end) {
         return Err(Failure::Usage(format!(
             "--until {until}: the scene runs from 0 to {end} s; use --set time.end={until} to run \
@@ -179,7 +179,7 @@ fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
         }
     }
     scene.recording.times = kept;
-    scene.time.end = Quantity::number(until);
+    scene.time.end = Some(Quantity::number(until));
     Ok(scene)
 }
 

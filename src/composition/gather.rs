@@ -214,6 +214,11 @@ impl Gathered {
         self.weight[9 * material + g]
     }
 
+    /// Share of a material in the cell, after [`Gathered::match_volumes`].
+    pub fn mean_share(&self, material: usize) -> f64 {
+        GAUSS_3X3.iter().enumerate().map(|(g, point)| point.weight * self.share(material, g)).sum()
+    }
+
     /// Volumes of the materials.
     pub fn volumes(&self) -> &[f64] {
         &self.volume

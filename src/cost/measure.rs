@@ -41,7 +41,15 @@ impl Target {
             floor: Quantity::number(0.0),
         });
         let floor = interest.floor.eval(&Scope::new(scene)?)?;
-        Ok(Target { quantity: interest.quantity, at: interest.at, norm: interest.norm, floor })
+        let (mut quantity, mut at) = (interest.quantity, interest.at);
+        if scene.time.steady {
+            // No time passes, so no volume.
+            at = Moment::Start;
+            if let Interesting::Gauge(name) = quantity {
+                quantity = Interesting::Rate(name);
+            }
+        }
+        Ok(Target { quantity, at, norm: interest.norm, floor })
     }
 
     /// True for a field, false for a single number.

@@ -17,7 +17,7 @@ pub fn planned(source: &SceneSource, sets: &[String]) -> Result<Arc<Plan>, CostE
 /// `--set` assignments that end a scene at a share of its time, and that end time in seconds.
 /// Frames keep their interval.
 pub fn shortened(scene: &Scene, share: f64) -> Result<(Vec<String>, f64), CostError> {
-    let end = scene.time.end.eval(&Scope::new(scene)?)?;
+    let end = scene.time.end()?.eval(&Scope::new(scene)?)?;
     let frames = f64::from(scene.recording.frames);
     let kept = (frames * share).ceil().max(1.0);
     // A whole number of frame intervals, so that steps end at frame times as in the scene.

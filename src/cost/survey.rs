@@ -68,7 +68,7 @@ pub fn price(
     let plan = planned(source, &[])?;
     let target = Target::of(&scene).map_err(|e| e.with_source(source))?;
     let mut limits = effort.limits();
-    let full = scene.time.end.eval(&Scope::new(&scene)?)?;
+    let full = scene.time.end()?.eval(&Scope::new(&scene)?)?;
     let pilot = Pilot::run(plan.clone(), 0.5 * limits.base)?;
     let coarse = if target.at != Moment::Start && pilot.whole() > limits.base {
         Coarse::run(source, &scene, &target, &pilot, COARSE_SHARE * limits.total)?

@@ -5,6 +5,16 @@ use super::Plan;
 use crate::scene::Quadrature;
 use serde::Serialize;
 
+/// Stages that a steady flow does not have.
+const MOVING: [&str; 6] = [
+    "advection",
+    "population control",
+    "director turning",
+    "restoring loads",
+    "volume change",
+    "dye",
+];
+
 /// Effects that a scene may need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EffectKind {
@@ -158,6 +168,9 @@ impl Plan {
         stages.push("advection");
         stages.extend(effects.iter().filter(|e| e.solved).flat_map(|e| e.stages.iter().copied()));
         stages.push("population control");
+        if self.scene.time.steady {
+            stages.retain(|s| !MOVING.contains(s));
+        }
         let sizes = |axis: &crate::space::mesh::Axis| {
             let all = (0..axis.cells()).map(|c| axis.size(c) * self.units.length);
             let low = all.clone().fold(f64::INFINITY, f64::min);

@@ -8,6 +8,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::error::SceneError;
 use super::quantity::{Field, Quantity};
 
 /// A scene file (`schema = 1`). All values are in SI units; x points to the right, y up.
@@ -697,8 +698,13 @@ pub struct DyeMark {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
-    /// End time, s.
-    pub end: Quantity,
+    /// End time, s; required unless the flow is steady.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end: Option<Quantity>,
+    /// Whether only the flow of the initial layout is solved, to its steady state: no material
+    /// moves and no time passes, so the other keys of `[time]` are not used. Not with inertia.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub steady: bool,
     /// Largest time step, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_step: Option<Quantity>,
@@ -871,6 +877,22 @@ impl Default for Mesh {
     }
 }
 
+impl Time {
+    /// The end time: zero for a steady flow.
+    ///
+    /// # Errors
+    /// [`SceneError`] if it is missing.
+    pub fn end(&self) -> Result<Quantity, SceneError> {
+        if self.steady {
+            return Ok(Quantity::number(0.0));
+        }
+        self.end.clone().ok_or_else(|| {
+            let remedy = "give the end in seconds, or steady = true for the flow of the start";
+            SceneError::of_key("time", "time.end is missing", remedy)
+        })
+    }
+}
+
 impl Default for Accuracy {
     fn default() -> Self {
         Accuracy {
@@ -881,7 +903,7 @@ impl Default for Accuracy {
             integrator: Integrator::Extrapolated,
             stabilisation: 0.75,
             tolerance: 1e-12,
-            nonlinear_tolerance: 1e-3,
+            nonlinear_tolerance: 1e-2,
             max_corrections: 40,
             seed: 1,
         }

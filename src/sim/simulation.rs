@@ -123,7 +123,7 @@ impl<const D: usize> Simulation<D> {
         constraints.refer(plan.pressure_reference);
         let mut quadrature =
             Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len());
-        quadrature.bind_kinks(|cell| constraints.fixed_sides(&mesh, cell));
+        quadrature.bind_walls(|cell| constraints.fixed_sides(&mesh, cell));
         let stokes = Stokes::new(mesh.clone(), constraints);
         let population =
             Population::new(&mesh, &plan.enclosure, plan.method.seeding, plan.background());

@@ -6,6 +6,7 @@ use super::laminate::{self, Cut};
 use super::last_flow::LastFlow;
 use super::points::{CutStiffness, IntegrationPoint, Place};
 use super::sides::{self, Sides};
+use crate::composition::centroids::Centroids;
 use crate::composition::interface::Interface;
 use crate::composition::straight::StraightCut;
 use crate::composition::{Content, Gathered, Kind};
@@ -15,6 +16,7 @@ use crate::laws::point::PointLaw;
 use crate::laws::{Here, Softening};
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
+use crate::space::constraints::FixedSides;
 use crate::space::kink::Ramp;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
@@ -45,8 +47,8 @@ pub struct Evaluation<'a> {
     pub content: &'a [Content],
     /// Factor on each material's volume in cut cells.
     pub factors: &'a [f64],
-    /// Ramp of the kink that the velocity of each cell may have.
-    pub ramps: &'a [Option<Ramp>],
+    /// Sides of each cell on which the velocity is prescribed.
+    pub walls: &'a [FixedSides],
     /// Last iterate, for laws that depend on rates or pressure.
     pub flow: &'a dyn LastFlow,
 }
@@ -57,6 +59,8 @@ enum Form {
     Cut { interface: Interface, between: [usize; 2] },
     /// Two materials of different weight separated by a straight line.
     Sides { cut: StraightCut, between: [usize; 2] },
+    /// A thin film between grains and a rough wall.
+    Film,
     /// Materials of different weight in no known arrangement.
     Weights,
     /// Drops in a material of the viscosity `around`.
@@ -122,18 +126,21 @@ impl Evaluation<'_> {
         };
         let mixture = match form {
             Form::Drops { around } => Mixture::around_drops(around),
-            Form::Sides { .. } | Form::Weights => Mixture::parallel(),
+            Form::Sides { .. } | Form::Film | Form::Weights => Mixture::parallel(),
             Form::Cut { .. } | Form::Mixture => Mixture::default(),
         };
         scratch.match_volumes(self.factors);
         // Where the stress is not the sum of those of the materials, its derivative is left out.
         let softened = match &form {
             Form::Sides { cut, .. } => 1.0 - cut.trust,
-            Form::Weights => 1.0,
+            Form::Film | Form::Weights => 1.0,
             Form::Mixture if scratch.volumes().iter().filter(|&&v| v > 0.0).count() == 1 => 1.0,
             Form::Cut { .. } | Form::Drops { .. } | Form::Mixture => 0.0,
         };
-        self.points(cell, out, scratch, (mixture, softened));
+        let film = matches!(form, Form::Film);
+        let shares =
+            |m: usize, g: usize| if film { scratch.mean_share(m) } else { scratch.share(m, g) };
+        self.points(cell, out, (scratch, &shares), (mixture, softened));
         let cut = match form {
             Form::Cut { interface, between } => {
                 let cut = self.laminate(cell, &interface, between, scratch);
@@ -146,7 +153,7 @@ impl Evaluation<'_> {
                 cut
             }
             Form::Sides { cut, between } => self.sides(cell, cut, between, (scratch, out)),
-            Form::Weights | Form::Drops { .. } | Form::Mixture => return,
+            Form::Film | Form::Weights | Form::Drops { .. } | Form::Mixture => return,
         };
         *out.cut = Some(match kept {
             Some(mut kept) => {
@@ -161,6 +168,9 @@ impl Evaluation<'_> {
     fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
         if self.rule == Rule::Sides && self.densities_differ(scratch.volumes()) {
             let between = present(scratch.volumes());
+            if between.is_some_and(|b| self.is_film(cell, b, scratch)) {
+                return Form::Film;
+            }
             let cut = between.and_then(|b| Some((self.straight_cut(cell, b, scratch)?, b)));
             return match cut {
                 Some((cut, between)) => Form::Sides { cut, between },
@@ -199,6 +209,40 @@ impl Evaluation<'_> {
         })
     }
 
+    /// Whether a thin fluid lies between grains with friction and a side along which the velocity is
+    /// prescribed, and fills less than half of the cell.
+    ///
+    /// Such a side is a rough wall. Grains that advance along it roll over what was there before, since
+    /// nothing moves at the wall itself, and the film that remains is thinner than a grain. As a layer
+    /// of its own it would let the grains glide: the front of a collapsing column then reaches 5.0
+    /// instead of 4.6 column heights (3.9 in experiments with single grains).
+    fn is_film(&self, cell: usize, between: [usize; 2], scratch: &mut Gathered) -> bool {
+        let held = self.walls[cell].along;
+        let rubs =
+            |m: usize| self.materials[m].law.curve.as_ref().is_some_and(|c| c.friction().is_some());
+        let [grains, film] = match between.map(rubs) {
+            [true, false] => between,
+            [false, true] => [between[1], between[0]],
+            _ => return false,
+        };
+        if held == [false; 4] {
+            return false;
+        }
+        let centroids = self.centroids(cell, scratch);
+        let [from, to] = [grains, film].map(|m| centroids.centroid(m));
+        let way = [to[0] - from[0], to[1] - from[1]];
+        // The side that the film lies on, if it lies on one.
+        let normal = usize::from(way[0].abs() < way[1].abs());
+        let side = 2 * normal + usize::from(way[normal] > 0.0);
+        held[side] && centroids.share(film) < 0.5
+    }
+
+    /// Shares and centroids of the materials of a gathered cell.
+    fn centroids<'s>(&self, cell: usize, scratch: &'s mut Gathered) -> &'s Centroids {
+        let viscosity = self.materials.iter().map(|m| m.viscosity);
+        scratch.centroids((self.mesh, cell), self.particles, self.factors, viscosity)
+    }
+
     /// The straight line between the two materials of a gathered cell.
     fn straight_cut(
         &self,
@@ -206,9 +250,7 @@ impl Evaluation<'_> {
         [_, b]: [usize; 2],
         scratch: &mut Gathered,
     ) -> Option<StraightCut> {
-        let viscosity = self.materials.iter().map(|m| m.viscosity);
-        let centroids =
-            scratch.centroids((self.mesh, cell), self.particles, self.factors, viscosity);
+        let centroids = self.centroids(cell, scratch);
         StraightCut::new(centroids.share(b), centroids.centroid(b))
     }
 
@@ -290,7 +332,7 @@ impl Evaluation<'_> {
             (sides::varying(&cut, &laws, measure), None)
         } else {
             let laws = between.map(|m| self.law_at_centre(cell, m, scratch));
-            sides::matrix(&cut, &laws, measure, self.ramps[cell])
+            sides::matrix(&cut, &laws, measure, Ramp::new(self.walls[cell].any))
         };
         matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);
         CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kinked }) }
@@ -327,7 +369,7 @@ impl Evaluation<'_> {
         &self,
         cell: usize,
         out: &mut CellMut,
-        scratch: &Gathered,
+        (scratch, share): (&Gathered, &dyn Fn(usize, usize) -> f64),
         (empty, softened): (Mixture, f64),
     ) {
         out.fractions.fill(0.0);
@@ -336,7 +378,7 @@ impl Evaluation<'_> {
             let IntegrationPoint { r, weight, .. } = out.points[g];
             let mut mixture = empty;
             for (m, material) in self.materials.iter().enumerate() {
-                let phi = scratch.share(m, g);
+                let phi = share(m, g);
                 if phi == 0.0 {
                     continue;
                 }

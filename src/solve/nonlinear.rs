@@ -42,6 +42,8 @@ const OVERSHOOT: f64 = 1.0;
 const NEAR: f64 = 0.1;
 /// Share of the change of the pressure that the laws take from the second time on.
 const RELAXED: f64 = 0.5;
+/// Largest number of corrections that remove the divergence of a converged flow.
+const MOST_PROJECTIONS: u32 = 20;
 /// Divergence, relative to the strain rate, of a converged flow.
 const DIVERGENCE: f64 = 1e-8;
 /// Dissipation below this share of the scale of power is that of a scene at rest.
@@ -193,8 +195,8 @@ impl<const D: usize> Stokes<D> {
             self.report(&work.residual, loads, flow, report)?;
             let converged = report.decrement.is_some_and(|d| d <= stopping.nonlinear);
             report.seconds.solve += clock.elapsed().as_secs_f64();
-            if converged && current && report.divergence <= DIVERGENCE {
-                return Ok(());
+            if converged && current {
+                return self.remove_divergence(quadrature, loads, (flow, report, work));
             }
             if report.iterations == MOST_ITERATIONS {
                 let [x, y] = self.largest_residual(&work.residual);
@@ -235,6 +237,34 @@ impl<const D: usize> Stokes<D> {
             add_scaled(&mut flow.pressure, share, &work.correction.pressure);
             report.seconds.solve += clock.elapsed().as_secs_f64();
         }
+    }
+
+    /// Removes the divergence that the last correction has left, by corrections with the last
+    /// factor that keep the balance of forces.
+    fn remove_divergence(
+        &mut self,
+        quadrature: &Quadrature,
+        loads: Loads<D>,
+        (flow, report, work): (&mut Flow<D>, &mut Report, &mut Work<D>),
+    ) -> Result<(), SolveError> {
+        let clock = Instant::now();
+        let mut tried = 0;
+        work.kept = 0;
+        while report.divergence > DIVERGENCE {
+            if tried == MOST_PROJECTIONS {
+                return Err(self.stalled(&work.residual, report, f64::INFINITY));
+            }
+            tried += 1;
+            work.residual.force.fill([0.0; D]);
+            self.correct(quadrature, work);
+            self.combine(work, true);
+            self.apply(work, flow);
+            report.corrections += 1;
+            self.residual(quadrature, loads, flow, work);
+            self.report(&work.residual, loads, flow, report)?;
+        }
+        report.seconds.solve += clock.elapsed().as_secs_f64();
+        Ok(())
     }
 
     /// Evaluates the laws at the velocity of a flow and at a pressure.

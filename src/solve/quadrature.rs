@@ -32,7 +32,8 @@ use crate::laws::point::PointLaw;
 use crate::laws::rates::Rates;
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
-use crate::space::kink::{Kink, Ramp};
+use crate::space::constraints::FixedSides;
+use crate::space::kink::Kink;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_3X3, NODES, Shape};
@@ -50,8 +51,8 @@ pub struct Quadrature {
     pub(super) points: Vec<IntegrationPoint>,
     /// Index of the first point of each cell, and the number of points.
     pub(super) start: Vec<u32>,
-    /// Ramp of the kink that the velocity of each cell may have.
-    ramps: Vec<Option<Ramp>>,
+    /// Sides of each cell on which the velocity is prescribed.
+    walls: Vec<FixedSides>,
     /// Stiffness of cut cells.
     cut: Vec<Option<Box<CutStiffness>>>,
     /// Mean viscosity of each cell; where a laminate is used, the mean by volume. It scales the
@@ -94,7 +95,7 @@ impl Quadrature {
             kinds: Vec::with_capacity(materials),
             points,
             start,
-            ramps: vec![Ramp::new([false; 4]); cells],
+            walls: vec![FixedSides::default(); cells],
             cut: vec![None; cells],
             mean_viscosity: vec![0.0; cells],
             compliance: vec![0.0; cells],
@@ -130,10 +131,9 @@ impl Quadrature {
         out
     }
 
-    /// Declares the sides of each cell on which the velocity is prescribed, so that kinks must be
-    /// zero there.
-    pub fn bind_kinks(&mut self, fixed: impl Fn(usize) -> [bool; 4]) {
-        self.ramps.iter_mut().enumerate().for_each(|(cell, r)| *r = Ramp::new(fixed(cell)));
+    /// Declares the sides of each cell on which the velocity is prescribed.
+    pub fn bind_walls(&mut self, fixed: impl Fn(usize) -> FixedSides) {
+        self.walls.iter_mut().enumerate().for_each(|(cell, walls)| *walls = fixed(cell));
     }
 
     /// Materials of all cells.
@@ -320,7 +320,7 @@ impl Quadrature {
             rule,
             composition,
             kinds,
-            ramps,
+            walls,
             points,
             cut,
             mean_viscosity,
@@ -342,7 +342,7 @@ impl Quadrature {
             kinds,
             content: composition.contents(),
             factors,
-            ramps,
+            walls,
             flow,
         };
         let cells = CellsMut {

@@ -198,7 +198,7 @@ impl<const D: usize> Stokes<D> {
 
     /// The error of a solution that did not converge, with the position of the largest residual, or
     /// of the largest divergence if the residual has converged.
-    fn stalled(&self, r: &Residual<D>, report: &Report, tolerance: f64) -> SolveError {
+    pub(super) fn stalled(&self, r: &Residual<D>, report: &Report, tolerance: f64) -> SolveError {
         let largest = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
         let [x, y] = if report.residual > tolerance {
             self.largest_residual(r)

@@ -3,7 +3,17 @@
 
 use super::flow::Flow;
 use super::mesh::Mesh;
-use super::shape::{GAUSS_3X3, NODES, SIDE_NODES};
+use super::shape::{GAUSS_3X3, NODES, SIDE_NODES, side_normal};
+
+/// The sides of a cell, in the order of [`SIDE_NODES`], on all nodes of which the velocity is
+/// prescribed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FixedSides {
+    /// One of its components.
+    pub any: [bool; 4],
+    /// The component along the side.
+    pub along: [bool; 4],
+}
 
 /// Prescribed values of nodal unknowns, and the null spaces that remain.
 #[derive(Clone, Debug)]
@@ -56,11 +66,14 @@ impl<const D: usize> Constraints<D> {
         self.fixed[node][c].then_some(self.value[node][c])
     }
 
-    /// Whether a velocity component is prescribed on all nodes of each side of a cell.
-    pub fn fixed_sides(&self, mesh: &Mesh, cell: usize) -> [bool; 4] {
+    /// The sides of a cell on which the velocity is prescribed.
+    pub fn fixed_sides(&self, mesh: &Mesh, cell: usize) -> FixedSides {
         let nodes = mesh.cell_nodes(cell);
-        let fixed = |side: [usize; 3], c| side.iter().all(|&a| self.is_fixed(nodes[a], c));
-        SIDE_NODES.map(|side| (0..2).any(|c| fixed(side, c)))
+        let fixed = |s: usize, c| SIDE_NODES[s].iter().all(|&a| self.is_fixed(nodes[a], c));
+        FixedSides {
+            any: std::array::from_fn(|s| (0..2).any(|c| fixed(s, c))),
+            along: std::array::from_fn(|s| fixed(s, 1 - side_normal(s))),
+        }
     }
 
     /// Declares a free rigid translation along `c`; its mean velocity will be zero.

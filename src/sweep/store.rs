@@ -192,7 +192,7 @@ impl Store {
             State::Done | State::Failed(_) => 1.0,
             State::Missing => {
                 let time = last_time(&self.running(&case.id).join("series.csv"));
-                (time.unwrap_or(0.0) / case.end).clamp(0.0, 1.0)
+                if case.end > 0.0 { (time.unwrap_or(0.0) / case.end).clamp(0.0, 1.0) } else { 0.0 }
             }
         }
     }

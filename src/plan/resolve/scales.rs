@@ -50,8 +50,12 @@ pub(super) fn choose_units(
         let size = largest(&a.x, inside)?.max(largest(&a.y, inside)?);
         rate = rate.max(density * size * length / viscosity);
     }
-    let end = scene.time.end.eval(scope)?;
-    let time = if rate > 0.0 { 1.0 / rate } else { end };
+    let end = scene.time.end()?.eval(scope)?;
+    let time = match [1.0 / rate, end] {
+        [time, _] if time.is_finite() => time,
+        [_, end] if end > 0.0 => end,
+        _ => 1.0,
+    };
     Ok(Units {
         length: power_of_two(length),
         viscosity: power_of_two(viscosity),

@@ -10,7 +10,7 @@ const MOST_FRAMES: u32 = 1_000_000;
 /// End time, limits of the time step, and times of frames.
 pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<ClockPlan> {
     let t = &scene.time;
-    let end = positive(&t.end, scope, "time.end")?;
+    let end = if t.steady { still(scene)? } else { positive(&t.end()?, scope, "time.end")? };
     let max_step = t.max_step.as_ref().map(|q| positive(q, scope, "time.max_step")).transpose()?;
     if !(t.courant > 0.0 && t.courant <= 50.0) {
         return Err(SceneError::of_key(
@@ -41,9 +41,12 @@ pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<Clock
             format!("give 0 to {MOST_FRAMES}: every frame ends a step"),
         ));
     }
-    let mut frames: Vec<f64> =
-        (0..=r.frames).map(|k| end * f64::from(k) / f64::from(r.frames.max(1))).collect();
-    for q in &r.times {
+    let mut frames: Vec<f64> = if t.steady {
+        vec![0.0]
+    } else {
+        (0..=r.frames).map(|k| end * f64::from(k) / f64::from(r.frames.max(1))).collect()
+    };
+    for q in r.times.iter().filter(|_| !t.steady) {
         let v = q.eval(scope)?;
         if !(0.0..=end * (1.0 + 1e-12)).contains(&v) {
             return Err(SceneError::at(
@@ -61,7 +64,9 @@ pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<Clock
     let frames: Vec<f64> = frames.into_iter().map(|v| v / units.time).collect();
     let end = end / units.time;
     let mut stops: Vec<f64> = frames.iter().copied().filter(|&v| v > 0.0 && v < end).collect();
-    stops.push(end);
+    if !t.steady {
+        stops.push(end);
+    }
     Ok(ClockPlan {
         end,
         max_step: max_step.map(|v| v / units.time),
@@ -72,4 +77,23 @@ pub(super) fn clock(scene: &Scene, scope: &Scope, units: &Units) -> Result<Clock
         stops,
         frames,
     })
+}
+
+/// End time of a steady flow: zero.
+fn still(scene: &Scene) -> Result<f64> {
+    if scene.inertia {
+        return Err(SceneError::of_key(
+            "time.steady",
+            "time.steady is true in a scene with inertia",
+            "set inertia = false, or run to a time at which the flow is steady",
+        ));
+    }
+    if !scene.schedule.is_empty() {
+        return Err(SceneError::of_key(
+            "time.steady",
+            "time.steady is true in a scene with a [[schedule]]",
+            "remove the [[schedule]]: no time passes",
+        ));
+    }
+    Ok(0.0)
 }
