@@ -37,7 +37,7 @@ impl Problem {
         let faults = all.map(|e| Fault {
             message: e.headline(),
             remedy: e.remedy().map(String::from),
-            line: e.span().and_then(|span| line_at(source.text(), span.start)),
+            line: e.span().and_then(|span| line_at(source.file(), span.start)),
         });
         Problem { title: format!("{name} cannot be run"), faults: faults.collect(), scene: None }
     }

@@ -7,7 +7,7 @@ use miette::{Diagnostic, NamedSource, SourceSpan};
 use thiserror::Error;
 
 use super::keys::span_of;
-use super::source::SceneSource;
+use super::source::{Origin, SceneSource};
 
 /// Largest number of errors reported at once.
 pub(super) const MAX_ERRORS: usize = 8;
@@ -45,6 +45,8 @@ enum Site {
     Key(Box<str>),
     /// `file` or `file:line:column`.
     Place(Box<str>),
+    /// A `--set` argument, which the message names.
+    Argument,
 }
 
 /// Something that an error can point at: a value of the scene or a byte range of its text.
@@ -98,7 +100,7 @@ impl SceneError {
 
     /// Adds file name and text to this error and to all related errors that have none yet.
     pub fn with_source(mut self, source: &SceneSource) -> Self {
-        if !matches!(*self.site, Site::Place(_)) {
+        if !matches!(*self.site, Site::Place(_) | Site::Argument) {
             self.locate(source);
         }
         self.related = self.related.into_iter().map(|e| e.with_source(source)).collect();
@@ -110,11 +112,20 @@ impl SceneError {
         if let (None, Site::Key(key)) = (self.span, &*self.site) {
             self.span = span_of(source.text(), key).map(SourceSpan::from);
         }
-        let Some(span) = self.span else {
-            *self.site = Site::Place(name.into());
-            return;
+        let span = match self.span().map(|span| source.origin(span)) {
+            None => {
+                *self.site = Site::Place(name.into());
+                return;
+            }
+            Some(Origin::Set(argument)) => {
+                self.message = printable(&format!("--set {argument}: {}", self.message)).into();
+                self.span = None;
+                *self.site = Site::Argument;
+                return;
+            }
+            Some(Origin::File(span)) => SourceSpan::from(span),
         };
-        let text = source.text();
+        let text = source.file();
         let start = text.floor_char_boundary(span.offset());
         let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
         let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
@@ -169,7 +180,7 @@ impl SceneError {
     pub fn headline(&self) -> String {
         let place = match &*self.site {
             Site::Place(place) => format!("{place}: "),
-            Site::Key(_) | Site::Unknown => String::new(),
+            Site::Key(_) | Site::Unknown | Site::Argument => String::new(),
         };
         format!("{place}{}", self.message).replace('\n', " ")
     }

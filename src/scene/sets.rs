@@ -1,7 +1,9 @@
 //! This module implements `--set`, which changes single values in the text of a scene and leaves
 //! the rest of the text unchanged.
 
-use toml_edit::{DocumentMut, InlineTable, Item, Table, Value};
+use std::ops::Range;
+
+use toml_edit::{Document, DocumentMut, InlineTable, Item, Table, Value};
 
 use super::error::{SceneError, suggestion};
 use super::load::table;
@@ -60,12 +62,22 @@ impl SceneSource {
                 let plain = || SceneError::at(&e.span(), e.message(), "").with_source(self);
                 table(self).err().unwrap_or_else(plain)
             })?;
-        let errors = sets.iter().filter_map(|set| {
-            let (message, help) = apply(document.as_item_mut(), set).err()?;
-            Some(SceneError::new(format!("--set {set}: {message}"), help))
-        });
+        let mut source = self.clone();
+        let mut errors = vec![];
+        for set in sets {
+            match apply(document.as_item_mut(), set) {
+                Ok(steps) => {
+                    let text = document.to_string();
+                    let value = span_of(&text, &steps);
+                    source = source.after_set(set, text, value);
+                }
+                Err((message, help)) => {
+                    errors.push(SceneError::new(format!("--set {set}: {message}"), help));
+                }
+            }
+        }
         SceneError::join(errors)?;
-        Ok(SceneSource::new(self.name(), document.to_string()))
+        Ok(source)
     }
 }
 
@@ -76,7 +88,26 @@ fn fault<T>(message: impl Into<String>, help: impl Into<String>) -> Result<T, Fa
     Err((message.into(), help.into()))
 }
 
-fn apply(root: &mut Item, set: &str) -> Result<(), Fault> {
+/// Byte range of the key and value at a path.
+fn span_of(text: &str, steps: &[Step]) -> Option<Range<usize>> {
+    let document = Document::parse(text).ok()?;
+    let mut item = document.as_item();
+    let mut key = None;
+    for step in steps {
+        (key, item) = match step {
+            Step::Key(name) => {
+                let (key, inner) = item.as_table_like()?.get_key_value(name)?;
+                (key.span(), inner)
+            }
+            Step::Index(index) => (None, item.get(*index)?),
+        };
+    }
+    let value = item.span()?;
+    Some(key.map_or(value.start, |key| key.start.min(value.start))..value.end)
+}
+
+/// Applies an argument and returns the path of the value that it has set.
+fn apply(root: &mut Item, set: &str) -> Result<Vec<Step>, Fault> {
     const FORMS: &str = "write name=value or path.to.key=value, such as alpha=0.5, gravity[1]=-5 \
                          or walls[0].kind=no_slip";
     let Some((path, value)) = set.split_once('=') else {
@@ -123,7 +154,8 @@ fn apply(root: &mut Item, set: &str) -> Result<(), Fault> {
     {
         root.insert("gravity", Item::Value([0.0, 0.0].into_iter().collect()));
     }
-    write(root, &steps, value)
+    write(root, &steps, value)?;
+    Ok(steps)
 }
 
 /// The keys of a table of the scene.
@@ -330,8 +362,21 @@ mod tests {
             assert!(error.remedy().is_none_or(|h| h.contains(help)), "{}", error.one_line());
         }
         assert_eq!(set(&["b=1", "c=1", "alpha=1"]).expect_err("two").lines().len(), 2);
+        let outside = set(&["alpha=101"]).and_then(|s| {
+            parse(&s).and_then(|scene| Scope::new(&scene).map_err(|e| e.with_source(&s)))
+        });
+        let said = outside.expect_err("outside its range").one_line();
+        assert!(said.starts_with("--set alpha=101: parameter `alpha` is 101"), "{said}");
         let typo = set(&["accuracy.cels=3"]).and_then(|s| parse(&s)).expect_err("unknown");
         assert!(typo.one_line().contains("did you mean `cells`?"), "{}", typo.one_line());
+        assert!(typo.one_line().starts_with("--set accuracy.cels=3: "), "{}", typo.one_line());
+        // Other errors are at the lines of the file.
+        let silo = presets::find("silo").expect("listed");
+        let text = silo.text().replacen("cells = 6", "cells = -6", 1);
+        let lines = |s: &SceneSource| parse(s).expect_err("negative").lines();
+        let faulty = SceneSource::new("silo", text);
+        let sets = ["alpha=0.5".to_string(), "mesh.growth=1.3".into()];
+        assert_eq!(lines(&faulty.with_sets(&sets).expect("valid")), lines(&faulty));
     }
 
     #[test]

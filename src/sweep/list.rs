@@ -330,7 +330,11 @@ mod tests {
             (&["alpha=0,1"], Some("sobol:4"), "nothing to sample"),
             (&["alpha=0", "alpha=1"], None, "varied twice"),
             (&["alhpa=0,1"], None, "case alhpa=0: --vary alhpa=0: there is no parameter `alhpa`"),
-            (&["alpha=0,200"], None, "case alpha=200: parameter `alpha` is 200, outside its range"),
+            (
+                &["alpha=0,200"],
+                None,
+                "case alpha=200: --vary alpha=200: parameter `alpha` is 200, outside",
+            ),
             (&["alpha=0..1:400", "contrast=1..2:400"], None, "more than 100000"),
         ] {
             let set = |spec: &mut Spec| spec.sample = sample.map(String::from);
