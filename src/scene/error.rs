@@ -198,26 +198,44 @@ impl SceneError {
     }
 }
 
-/// The candidate most similar to a mistyped name; `None` if no candidate is similar enough.
-pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+/// The candidates that may be meant by a mistyped name: those that contain it or that it contains;
+/// if there are none, the most similar one, if it is similar enough.
+fn near<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+    /// Shorter names are contained in too many others.
+    const SHORTEST: usize = 3;
     if name.len() > 100 {
-        return None;
+        return vec![];
     }
     let lower = name.to_lowercase();
-    let likeness = |c: &str| strsim::jaro_winkler(&lower, &c.to_lowercase());
-    candidates
-        .into_iter()
-        .map(|c| (c, likeness(c)))
-        .filter(|(_, likeness)| *likeness > 0.78)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(c, _)| c)
+    let candidates: Vec<(&str, String)> =
+        candidates.into_iter().map(|c| (c, c.to_lowercase())).collect();
+    let parts = candidates.iter().filter(|(_, c)| {
+        lower.len().min(c.len()) >= SHORTEST && (c.contains(&lower) || lower.contains(c))
+    });
+    let parts: Vec<&str> = parts.map(|(c, _)| *c).collect();
+    if !parts.is_empty() {
+        return parts;
+    }
+    let like = candidates.iter().map(|(c, low)| (*c, strsim::jaro_winkler(&lower, low)));
+    let best = like.filter(|(_, l)| *l > 0.78).max_by(|a, b| a.1.total_cmp(&b.1));
+    best.into_iter().map(|(c, _)| c).collect()
+}
+
+/// The candidate that is most likely meant by a mistyped name; `None` if no candidate is similar
+/// enough.
+pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    near(name, candidates).into_iter().next()
 }
 
 /// The text `did you mean ...? <what>: ...`, as far as it applies.
 pub(super) fn suggestion(name: &str, what: &str, candidates: &[&str]) -> String {
-    let mut text = closest(name, candidates.iter().copied())
-        .map(|c| format!("did you mean `{c}`? "))
-        .unwrap_or_default();
+    let near: Vec<_> =
+        near(name, candidates.iter().copied()).iter().take(4).map(|c| format!("`{c}`")).collect();
+    let mut text = match near.as_slice() {
+        [] => String::new(),
+        [one] => format!("did you mean {one}? "),
+        [first @ .., last] => format!("did you mean {} or {last}? ", first.join(", ")),
+    };
     if candidates.is_empty() {
         text.push_str(&format!("{what}: none"));
     } else {
@@ -299,5 +317,11 @@ mod tests {
         assert_eq!(closest("dnsity", names), Some("density"));
         assert_eq!(closest("Colour", names), Some("colour"));
         assert_eq!(closest("zzz", names), None);
+        let keys = ["density", "shear_viscosity", "bulk_viscosity", "layer_viscosity"];
+        let said = suggestion("viscosity", "keys are", &keys);
+        let meant =
+            "did you mean `shear_viscosity`, `bulk_viscosity` or `layer_viscosity`? keys are";
+        assert!(said.starts_with(meant), "{said}");
+        assert!(suggestion("bulk_viscosity_1", "", &keys).starts_with("did you mean `bulk_visco"));
     }
 }

@@ -93,6 +93,12 @@ const FAULTS: &[Fault] = &[
         "0.5, 1.75",
         &["wall `left_wall` reaches (0.5, 1.75), outside the domain", "y = 0 to 1"],
     ),
+    (
+        "shear_viscosity = 100",
+        "viscosity = 100",
+        "viscosity",
+        &["unknown key `viscosity`", "did you mean `shear_viscosity`, `bulk_viscosity`"],
+    ),
     ("density = 1", "dnsity = 1", "dnsity", &["unknown key `dnsity`", "did you mean `density`?"]),
     (
         "density = 1",
