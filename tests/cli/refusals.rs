@@ -238,6 +238,12 @@ const FAULTS_OF_GRAINS: &[Fault] = &[
         &["material `air` has cohesion but no friction", "give friction = {"],
     ),
     (
+        "shear_viscosity = 1e-3",
+        "shear_viscosity = 1e-3\nlargest_viscosity = 7",
+        "7\nbackground",
+        &["has largest_viscosity but no friction or yield_stress", "or yield_stress = <Pa>"],
+    ),
+    (
         "largest_viscosity = 1e3",
         "largest_viscosity = 1e3\nsmallest_viscosity = 2e3",
         "2e3",

@@ -183,11 +183,16 @@ fn check_keys(name: &str, m: &scene::Material) -> Result<()> {
             if let Some(q) = q
                 && (key == "cohesion" || !generalised)
             {
+                const FRICTION: &str =
+                    "give friction = { static, dynamic, inertial_number, grain_diameter }";
+                let (lacks, other) = match key {
+                    "cohesion" => ("friction", ""),
+                    _ => ("friction or yield_stress", ", or yield_stress = <Pa>"),
+                };
                 return error(
                     q,
-                    &format!("{key} but no friction"),
-                    "give friction = { static, dynamic, inertial_number, grain_diameter }, or \
-                     remove the key",
+                    &format!("{key} but no {lacks}"),
+                    &format!("{FRICTION}{other}, or remove the key"),
                 );
             }
         }
