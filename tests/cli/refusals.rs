@@ -85,7 +85,12 @@ const FAULTS: &[Fault] = &[
         "from = [1.5, 0.25]\nto = [1.5, 0.75]",
         "from = [0.55, 0.25]\nto = [0.55, 0.75]",
         "",
-        &["left_wall", "right_wall", "closer than a cell", "raise accuracy.cells to at least 20"],
+        &[
+            "left_wall",
+            "right_wall",
+            "closer than a cell",
+            "raise accuracy.cells to at least 20, or move one of the two: to the same x, or 2.500e-1 m",
+        ],
     ),
     (
         "to = [0.5, 0.75]",

@@ -114,8 +114,11 @@ pub(super) fn mesh(
                     e.size
                 ),
                 format!(
-                    "move them apart or together, or raise accuracy.cells to at least {:.0}",
-                    (f64::from(scene.accuracy.cells) * e.size / gap).ceil()
+                    "raise accuracy.cells to at least {:.0}, or move one of the two: to the same \
+                     {}, or {:.3e} m or more from the other",
+                    (f64::from(scene.accuracy.cells) * e.size / gap).ceil(),
+                    ["x", "y"][c],
+                    e.size
                 ),
             )
         })?;
