@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
     /// Path of the recording; plots go to its folder [default: comparisons/<names>/compare.rrd]
-    #[arg(short, long, value_name = "PATH")]
+    #[arg(short, long = "out", alias = "output", value_name = "PATH")]
     output: Option<PathBuf>,
     /// Write no recording and no plots
     #[arg(long, conflicts_with_all = ["output", "serve", "open"])]

@@ -15,7 +15,7 @@ pub struct Args {
     #[arg(long, value_enum)]
     format: FormatName,
     /// Folder of the output [default: <folder of the run>/<format>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 

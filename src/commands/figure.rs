@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(long)]
     quick: bool,
     /// Folder of the output [default: figures/<name>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Overwrite runs that are already in the folder
     #[arg(long)]

@@ -17,7 +17,7 @@ pub struct Args {
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
     /// Path of the film; flow.png writes flow_00000.png, flow_00001.png, ...
-    #[arg(short, long, value_name = "PATH")]
+    #[arg(short, long = "out", alias = "output", value_name = "PATH")]
     output: PathBuf,
     /// Width (pixels)
     #[arg(long, value_name = "PIXELS", default_value_t = 720, value_parser = clap::value_parser!(u32).range(160..=4096))]

@@ -368,3 +368,22 @@ fn resolve(source: &SceneSource) -> Result<(Scene, crate::plan::Plan), Failure> 
     let plan = crate::plan::resolve(&scene).map_err(|e| e.with_source(source))?;
     Ok((scene, plan))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_outputs_are_named_alike() {
+        let mut count = 0;
+        for command in Cli::command().get_subcommands() {
+            for arg in command.get_arguments().filter(|a| a.get_long() == Some("out")) {
+                assert_eq!(arg.get_short(), Some('o'), "{}", command.get_name());
+                count += 1;
+            }
+            let other = command.get_arguments().find(|a| a.get_long() == Some("output"));
+            assert!(other.is_none(), "{}", command.get_name());
+        }
+        assert_eq!(count, 9);
+    }
+}

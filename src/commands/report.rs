@@ -16,7 +16,7 @@ pub struct Args {
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
     /// Path of the page [default: report.html in the folder of a single run, else ./report.html]
-    #[arg(short, long, value_name = "PATH")]
+    #[arg(short, long = "out", alias = "output", value_name = "PATH")]
     output: Option<PathBuf>,
     #[command(flatten)]
     detail: Amount,

@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(long, value_name = "TIME", value_parser = chosen::budget, conflicts_with = "accuracy")]
     budget: Option<f64>,
     /// Folder of the run [default: runs/<scene name>, numbered if taken]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Overwrite a run that is already in the folder
     #[arg(long)]

@@ -59,7 +59,7 @@ pub struct Args {
     #[arg(long, value_name = "K")]
     repeat_seeds: Option<u32>,
     /// Folder of the sweep [default: sweeps/<name>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Engine that runs the cases
     #[arg(long, value_enum, default_value_t = EngineName::Local)]
