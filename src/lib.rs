@@ -64,3 +64,4 @@ pub(crate) mod testing;
 pub mod threads;
 pub(crate) mod verify;
 pub(crate) mod web;
+pub(crate) mod words;

@@ -238,6 +238,9 @@ function renderProblem() {
   }
 }
 
+// A count with its noun: 1 cell, 2 cells.
+function count(n, noun) { return `${n.toLocaleString("en")} ${noun}${n === 1 ? "" : "s"}`; }
+
 function seconds(s) {
   if (s === null || s === undefined) return "–";
   if (s < 0.9995) return `${short(1e3 * s, 2)} ms`;
@@ -392,7 +395,7 @@ function renderSwitches() {
 function renderEffects() {
   if (!changed("effects", state.effects)) return;
   $("effects").replaceChildren(...state.effects.map((e) => make("li", { className: e.solved ? "solved" : "" },
-    e.name, " ", make("small", {}, `${e.solved ? "" : "not solved: "}${e.why}${e.unknowns ? `; ${e.unknowns.toLocaleString("en")} unknowns` : ""}`))));
+    e.name, " ", make("small", {}, `${e.solved ? "" : "not solved: "}${e.why}${e.unknowns ? `; ${count(e.unknowns, "unknown")}` : ""}`))));
 }
 
 function renderPhases(phases) {
@@ -414,7 +417,7 @@ function renderDial() {
     input.onchange = () => send({ do: "set", key: "accuracy.cells", value: String(d.cells) });
     const last = priced ? (d.error === null ? "–" : `${short(100 * d.error, 2)} %`) : `${short(d.unknowns / 1000, 3)} k`;
     return make("label", { className: `line${d.current ? " current" : ""}` }, input,
-      make("span", {}, `${d.cells} cells`),
+      make("span", {}, count(d.cells, "cell")),
       make("span", {}, d.seconds_per_step === null ? "–" : `${d.current ? "" : "≈ "}${seconds(d.seconds_per_step)} per step`),
       make("span", {}, last));
   });
@@ -436,7 +439,7 @@ function renderPins() {
   $("pin-name").placeholder = suggestion;
   $("pins").replaceChildren(...state.pins.map((p, k) => make("li", {},
     make("span", { className: "swatch", style: `background:${color(k + 1)}` }),
-    make("span", {}, p.name, make("small", {}, `${p.values || "values of the file"}; ${p.steps} steps to ${short(p.time)} s`)),
+    make("span", {}, p.name, make("small", {}, `${p.values || "values of the file"}; ${count(p.steps, "step")} to ${short(p.time)} s`)),
     make("button", { className: "small", ariaLabel: `Unpin ${p.name}`, onclick: () => send({ do: "unpin", name: p.name }) }, "Unpin"))));
 }
 
@@ -447,7 +450,7 @@ function renderSaved() {
   $("save-hint").textContent = `Recording, scene, table and plots, into ${state.out}/`;
   if (!changed("saved", state.saved)) return;
   $("saved").replaceChildren(...state.saved.map((s) => make("li", {},
-    make("b", {}, s.name), ` ${s.steps} steps`,
+    make("b", {}, s.name), ` ${count(s.steps, "step")}`,
     make("div", {}, ...s.files.filter(([name]) => !name.endsWith(".png")).map(([name, size]) =>
       make("a", { href: `api/saved/${s.name}/${name}`, download: `${s.name}-${name}`, title: bytes(size) }, name))),
     make("code", { title: `state ${s.state_hash}` }, s.command))));

@@ -98,7 +98,7 @@ async function check() {
   const { cells, unknowns, seconds_per_step: pace, effects, warnings } = found.draft;
   const cost = pace === null ? "" : `, about ${seconds(pace)} per step`;
   $("editor-says").replaceChildren(
-    make("p", {}, `${cells[0]} × ${cells[1]} cells, ${unknowns.toLocaleString("en")} unknowns${cost}`),
+    make("p", {}, `${cells[0]} × ${cells[1]} cells, ${count(unknowns, "unknown")}${cost}`),
     make("p", { className: "hint" }, `solved: ${effects.filter((e) => e.solved).map((e) => e.name).join(", ")}`),
     make("ul", {}, ...warnings.map((w) => make("li", {}, w))));
 }

@@ -3,6 +3,7 @@
 
 use super::{Failure, print};
 use crate::export::{self, ExportError, Format};
+use crate::words::count;
 use std::path::PathBuf;
 
 /// Export particles and fields of every frame, for ParaView or as tables.
@@ -47,8 +48,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| beside.unwrap_or(&args.run).join(name));
     let files = export::write(&frames, format, &folder)?;
     print(&format!(
-        "wrote {files} files of {} frames to {}",
-        frames.instants.len(),
+        "wrote {} of {} to {}",
+        count(files, "file"),
+        count(frames.instants.len(), "frame"),
         folder.display()
     ))
 }

@@ -14,6 +14,7 @@ use crate::scene::presets;
 use crate::session::{Interrupted, Options, Session, progress_bar, watch_interrupts};
 use crate::sim::Run;
 use crate::sweep;
+use crate::words::count;
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -259,7 +260,7 @@ fn make(
     let outflow = summary.gauges.values().next();
     let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} m2", g.volume));
     let took = duration(summary.seconds.get("total").copied().unwrap_or_default());
-    bar.suspend(|| eprintln!("{}: {} steps in {took}{outflow}", job.name, summary.steps));
+    bar.suspend(|| eprintln!("{}: {} in {took}{outflow}", job.name, count(summary.steps, "step")));
     Ok(pictures)
 }
 

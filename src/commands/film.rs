@@ -6,6 +6,7 @@ use crate::light::film::{FilmError, Look, Studio};
 use crate::light::reel::{Reel, ReelError};
 use crate::results;
 use crate::session::progress_bar;
+use crate::words::count;
 use std::path::PathBuf;
 
 /// Draw the frames of runs side by side: a film (.gif, .mp4) or numbered images (.png).
@@ -95,7 +96,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     bar.finish_and_clear();
     let files = files?;
     print(&match files.as_slice() {
-        [one] => format!("wrote {} frames to {}", studio.times.len(), one.display()),
+        [one] => format!("wrote {} to {}", count(studio.times.len(), "frame"), one.display()),
         [first, .., last] => format!("wrote {} to {}", first.display(), last.display()),
         [] => "there are no frames".into(),
     })

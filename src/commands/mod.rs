@@ -33,6 +33,7 @@ use crate::scene::{self, Scene, SceneError, SceneSource};
 use crate::session::{SessionError, handle_file_size_limit, tell};
 use crate::sim::SimError;
 use crate::simd::{self, InstructionSet, Simd};
+use crate::words::count;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::Path;
 use std::process::ExitCode;
@@ -283,7 +284,8 @@ pub fn main() -> ExitCode {
 fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
     let Some(n) = threads else { return Ok(()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n));
-    pool.build_global().map_err(|e| Failure::Environment(format!("cannot start {n} threads: {e}")))
+    pool.build_global()
+        .map_err(|e| Failure::Environment(format!("cannot start {}: {e}", count(n, "thread"))))
 }
 
 /// Sets the instruction set from the option, or else from the environment variable.

@@ -4,6 +4,7 @@ use super::{Failure, print};
 use crate::record::folder::RunFolder;
 use crate::record::replace::{self, Kind, beside};
 use crate::record::rerun_log::{Repaired, repair};
+use crate::words::count;
 use std::path::{Path, PathBuf};
 
 /// Close the recording or the files of a run that was killed.
@@ -45,20 +46,20 @@ fn mend_recording(path: &Path) -> Result<String, Failure> {
     let Repaired { kept, damage, saved, original } =
         repair(path).map_err(|e| Failure::Environment(e.to_string()))?;
     let steps = kept.last_step.map_or("no step".into(), |step| format!("steps 0 to {step}"));
-    let pictures = kept.pictures.len();
+    let pictures = count(kept.pictures.len(), "frame");
     let path = path.display();
     let Some(saved) = saved else {
-        return Ok(format!("{path}: is complete, {steps}, {pictures} frames"));
+        return Ok(format!("{path}: is complete, {steps}, {pictures}"));
     };
     let size = saved.bytes as f64 / 1e6;
-    let mut told = format!("{path}: repaired, {steps}, {pictures} frames, {size:.1} MB");
+    let mut told = format!("{path}: repaired, {steps}, {pictures}, {size:.1} MB");
     if let Some(original) = original {
         let missing = kept.last_step.map_or(0, |last| (last + 1) as usize - kept.rows.len());
         told += &format!(
-            "; lost: {} bytes in {} damaged places, and with them all values of {missing} steps; \
-             the original is kept as {}",
-            damage.bytes,
-            damage.places,
+            "; lost: {} in {}, and with them all values of {}; the original is kept as {}",
+            count(damage.bytes, "byte"),
+            count(damage.places, "damaged place"),
+            count(missing, "step"),
             original.display()
         );
     }
@@ -76,13 +77,13 @@ fn mend_table(path: &Path) -> Result<String, Failure> {
     let (rows, damaged): (Vec<&str>, Vec<&str>) = lines.partition(|line| is_row(line, header));
     let shown = path.display();
     if damaged.is_empty() && whole == text.len() {
-        return Ok(format!("{shown}: is complete, {} rows", rows.len()));
+        return Ok(format!("{shown}: is complete, {}", count(rows.len(), "row")));
     }
     if damaged.is_empty() {
         // An incomplete last row, as a killed run leaves it.
         let file = std::fs::File::options().write(true).open(path).map_err(fault)?;
         file.set_len(whole as u64).and_then(|()| file.sync_all()).map_err(fault)?;
-        return Ok(format!("{shown}: repaired, {} rows", rows.len()));
+        return Ok(format!("{shown}: repaired, {}", count(rows.len(), "row")));
     }
     let original = beside(path, ".damaged");
     if original.exists() {
@@ -96,9 +97,9 @@ fn mend_table(path: &Path) -> Result<String, Failure> {
         std::iter::once(&header).chain(&rows).map(|line| format!("{line}\n")).collect();
     replace::write(path, table, Kind::Checked)?;
     Ok(format!(
-        "{shown}: repaired, {} rows; lost: {} damaged rows; the original is kept as {}",
-        rows.len(),
-        damaged.len(),
+        "{shown}: repaired, {}; lost: {}; the original is kept as {}",
+        count(rows.len(), "row"),
+        count(damaged.len(), "damaged row"),
         original.display()
     ))
 }

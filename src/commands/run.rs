@@ -14,6 +14,7 @@ use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash};
 use crate::session::{
     Budget, Ended, Options, Recording, Safety, Session, tell, wait_for_interrupt, watch_interrupts,
 };
+use crate::words::count;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -194,9 +195,9 @@ fn report(ended: &Ended, profile: bool) -> String {
         Ending::Failed => "failed",
     };
     let mut out = format!(
-        "{} {ending}: {} steps to t = {:.4e} s in {}\n",
+        "{} {ending}: {} to t = {:.4e} s in {}\n",
         s.scene,
-        s.steps,
+        count(s.steps, "step"),
         s.time,
         duration(ended.wall)
     );

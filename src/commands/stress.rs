@@ -3,6 +3,7 @@
 use super::{Failure, print};
 use crate::record::replace::{self, Kind};
 use crate::stress::{self, Outcome, Trial};
+use crate::words::count;
 use std::path::PathBuf;
 
 /// Run hostile scenes and check each against fixed criteria.
@@ -66,9 +67,9 @@ fn conclude(args: &Args, trials: &[Trial], outcomes: &[Outcome]) -> Result<(), F
         lines.push(format!("\n  {}: {}: {}\n    {}", o.group, o.name, o.verdict, place.display()));
     }
     if lines.is_empty() {
-        eprintln!("{} trials, none failed", outcomes.len());
+        eprintln!("{}, none failed", count(outcomes.len(), "trial"));
         return Ok(());
     }
-    let head = format!("{} of {} trials failed", lines.len(), outcomes.len());
+    let head = format!("failed: {} of {}", lines.len(), count(outcomes.len(), "trial"));
     Err(Failure::Differs(head + &lines.concat()))
 }

@@ -11,6 +11,7 @@ use crate::sweep::{
     Case, Engine, Event, HyperQueue, Limits, List, Local, Spec, State, Store, SweepError, Work,
     preset_list, preset_source, read_file, similar,
 };
+use crate::words::count;
 use one::one;
 use results::collect;
 use std::path::{Path, PathBuf};
@@ -210,10 +211,11 @@ fn sweep(args: &Args) -> Result<(), Failure> {
     let open: Vec<&Case> =
         list.cases.iter().filter(|c| store.state(&c.id) != State::Done).collect();
     let (all, done) = (list.cases.len(), list.cases.len() - open.len());
-    eprintln!("{all} cases, {done} done before, in {}", out.display());
+    eprintln!("{}, {done} done before, in {}", count(all, "case"), out.display());
     let strangers = store.strangers(&list);
     if strangers > 0 {
-        eprintln!("note: {strangers} finished runs in the folder belong to other lists: not used");
+        let runs = count(strangers, "finished run");
+        eprintln!("note: {runs} of other lists in the folder: not used");
     }
     if args.dry_run {
         return print(&plan_text(&open, args));
@@ -312,10 +314,10 @@ fn verdict(store: &Store, list: &List) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Differs(format!(
-        "{} of {} cases are not done; the same command runs them again\n{}\n  help: the files of \
-         failed runs are in {}",
+        "not done: {} of {}; the same command runs them again\n{}\n  help: the files of failed \
+         runs are in {}",
         lines.len(),
-        list.cases.len(),
+        count(list.cases.len(), "case"),
         lines.join("\n"),
         store.root().join("failed").display()
     )))
@@ -358,13 +360,13 @@ fn plan_text(open: &[&Case], args: &Args) -> String {
     let limits = Limits::of_machine(args.jobs.map(|n| n as usize), args.cores as usize);
     let on = match args.engine {
         EngineName::Local => format!(
-            "on this machine up to {} at once, {} thread(s) each, in {} MB of memory",
+            "on this machine up to {} at once, {} each, in {} MB of memory",
             limits.jobs,
-            limits.threads,
+            count(limits.threads, "thread"),
             limits.memory / 1_000_000
         ),
-        EngineName::Hq => format!("as tasks of HyperQueue, {} core(s) each", limits.threads),
+        EngineName::Hq => format!("as tasks of HyperQueue, {} each", count(limits.threads, "core")),
     };
-    lines.push(format!("{} cases would run, {on}", open.len()));
+    lines.push(format!("{} would run, {on}", count(open.len(), "case")));
     lines.join("\n")
 }

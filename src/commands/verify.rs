@@ -4,6 +4,7 @@ use super::{Failure, print};
 use crate::record::plots::{Axis, Curve, PlotSpec, svg_plot};
 use crate::record::replace::{self, Kind};
 use crate::verify::{self, Effort, Figure, Report, SUBJECTS};
+use crate::words::count;
 use std::path::{Path, PathBuf};
 
 /// Measure the error of every case with a known solution.
@@ -49,10 +50,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .map(|c| format!("{}: {:.4e}, must be {}", c.what, c.value, c.bound))
         .collect();
     if failed.is_empty() {
-        eprintln!("{} checks, all passed", report.checks());
+        eprintln!("{}, none failed", count(report.checks(), "check"));
         return Ok(());
     }
-    let head = format!("{} of {} checks failed", failed.len(), report.checks());
+    let head = format!("failed: {} of {}", failed.len(), count(report.checks(), "check"));
     Err(Failure::Differs(format!("{head}\n  {}", failed.join("\n  "))))
 }
 

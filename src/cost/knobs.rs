@@ -2,6 +2,7 @@
 
 use crate::plan::{Plan, resolve};
 use crate::scene::{Integrator, Moment, Quadrature, Scene, SceneError, Scope};
+use crate::words::count;
 
 /// All knobs: name, scene keys, and description of the levels that are tried.
 pub const KNOBS: [(&str, &str, &str); 10] = [
@@ -167,7 +168,7 @@ fn particles(scene: &Scene) -> Option<Knob> {
         .map(|c| {
             let size = (f64::from(n) / f64::from(c)).sqrt();
             let set = format!("accuracy.particles_per_cell={c}");
-            sized(format!("{c} particles a cell"), size, vec![set])
+            sized(format!("{} a cell", count(c, "particle")), size, vec![set])
         })
         .collect();
     Knob::new("particles", levels, 1.0)

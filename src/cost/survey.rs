@@ -13,6 +13,7 @@ use super::reference::Reference;
 use crate::cases::exact_of;
 use crate::plan::Plan;
 use crate::scene::{Interesting, Moment, Placement, Scene, SceneSource, Scope, parse};
+use crate::words::count;
 use std::time::Instant;
 
 /// CPU and wall-clock time of each run, s.
@@ -96,10 +97,10 @@ pub fn price(
     let factors = if exact.is_some() { limits.factors_exact } else { limits.factors };
     let design = Design::new(&scene, &plan, target.at, factors)?;
     say(&format!(
-        "{}: {}; {} knobs; a whole run takes about {:.1} s of CPU time",
+        "{}: {}; {}; a whole run takes about {:.1} s of CPU time",
         scene.name,
         target.title(),
-        design.knobs.len(),
+        count(design.knobs.len(), "knob"),
         whole_seconds
     ));
     let mut survey = Survey {
@@ -384,7 +385,7 @@ impl Survey<'_> {
         let gauges = (0..found[0].gauges.len())
             .map(|k| spread(&|s| vec![s.gauges[k]], found[0].gauges[k].abs()))
             .collect();
-        (self.say)(&format!("  sampling: {:.2e} over {} seeds", all, found.len()));
+        (self.say)(&format!("  sampling: {:.2e} over {}", all, count(found.len(), "seed")));
         Ok((Some(all), gauges))
     }
 }

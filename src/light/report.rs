@@ -7,6 +7,7 @@ use crate::record::replace::{self, Kind, ReplaceError};
 use crate::record::text::escape;
 use crate::results::Member;
 use crate::sim::row;
+use crate::words::count;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use flate2::Compression;
@@ -169,12 +170,12 @@ fn run(member: &Member, detail: Detail) -> std::io::Result<(Run, Option<String>)
 fn about_frames(reel: &Reel, name: &str) -> String {
     let step = reel.description.resolution();
     let particles = match reel.kept < reel.recorded {
-        true => format!("{} of up to {} particles", reel.kept, reel.recorded),
-        false => format!("all {} particles", reel.recorded),
+        true => format!("{} of up to {}", reel.kept, count(reel.recorded, "particle")),
+        false => count(reel.recorded, "particle"),
     };
     let frames = match reel.frames.len() < reel.pictures {
-        true => format!("{} of {} frames", reel.frames.len(), reel.pictures),
-        false => format!("all {} frames", reel.pictures),
+        true => format!("{} of {}", reel.frames.len(), count(reel.pictures, "frame")),
+        false => count(reel.pictures, "frame"),
     };
     format!(
         "{name}: {frames} of the recording, {particles}; positions are rounded to 16 bits \

@@ -1,5 +1,6 @@
 //! This module defines warnings about a scene or a run, with remedies.
 
+use crate::words::ordinal;
 use std::fmt;
 
 /// A warning; its text includes the remedy.
@@ -130,7 +131,8 @@ impl fmt::Display for Warning {
             }
             Warning::ParticlesThinned { every } => write!(
                 f,
-                "every {every}th particle is recorded; raise recording.max_particles for more"
+                "every {} particle is recorded; raise recording.max_particles for more",
+                ordinal(*every)
             ),
             Warning::DyeCoarse { points } => write!(
                 f,
@@ -138,8 +140,12 @@ impl fmt::Display for Warning {
             ),
             Warning::CellsHealed { count } => write!(
                 f,
-                "{count} cells lost all their particles and were refilled from neighbours; \
-                 lower time.courant or raise accuracy.particles_per_cell"
+                "{} refilled from neighbours; lower time.courant or raise \
+                 accuracy.particles_per_cell",
+                match count {
+                    1 => "1 cell lost all its particles and was".into(),
+                    n => format!("{n} cells lost all their particles and were"),
+                }
             ),
             Warning::FarDomain { corner: [x, y] } => write!(
                 f,

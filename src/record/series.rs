@@ -2,6 +2,7 @@
 
 use crate::plan::Plan;
 use crate::sim::row::{GaugeRow, Place, Row, places};
+use crate::words::count;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -120,7 +121,8 @@ pub enum TableError {
     },
     /// Rows before the step to continue from are missing.
     #[error(
-        "{}: has only {rows} complete rows; the rows before step {step} are missing", path.display()
+        "{}: has only {}; the rows before step {step} are missing", path.display(),
+        count(.rows, "complete row")
     )]
     Short {
         /// Path of the table.
@@ -164,7 +166,7 @@ fn whole_rows(text: &str, plan: &Plan, until: u64) -> Result<(Vec<Row>, u64), (u
 fn parse(line: &str, places: &[Place], plan: &Plan) -> Result<Row, String> {
     let values: Vec<&str> = line.split(',').collect();
     if values.len() != places.len() {
-        return Err(format!("{} values; {} were expected", values.len(), places.len()));
+        return Err(format!("{}; expected: {}", count(values.len(), "value"), places.len()));
     }
     let mut row = Row::empty(plan.state.materials.len());
     row.gauges = plan.gauges.iter().map(|_| GaugeRow::default()).collect();

@@ -1,6 +1,7 @@
 //! This module formats plans and durations as text.
 
 use crate::plan::EffectList;
+use crate::words::count;
 
 /// Formats a plan as Markdown, for the panel of the recording.
 pub fn plan_markdown(plan: &EffectList) -> String {
@@ -33,7 +34,7 @@ pub fn plan_text(plan: &EffectList) -> String {
     for e in plan.effects.iter().filter(|e| e.solved) {
         let mut cost = Vec::new();
         if e.unknowns > 0 {
-            cost.push(format!("{} unknowns", e.unknowns));
+            cost.push(count(e.unknowns, "unknown"));
         }
         if e.particle_bytes > 0 {
             cost.push(format!("{} B a particle", e.particle_bytes));
@@ -52,11 +53,11 @@ pub fn plan_text(plan: &EffectList) -> String {
         let words: Vec<_> =
             phases.map(|(name, s)| format!("{name} {:.1} %", 100.0 * s / total)).collect();
         out += &format!(
-            "\nprocessor time of a step: {} (median of {} steps): {}\n\
+            "\nprocessor time of a step: {} (median of {}): {}\n\
              share: 1 - (time of a step without the effect)/(time of a step with it); for gravity, \
              dye\nand cut cells, the share of their own stages\n",
             duration(step.seconds),
-            step.steps,
+            count(step.steps, "step"),
             words.join(", ")
         );
     }
@@ -88,8 +89,10 @@ fn sizes(plan: &EffectList) -> String {
     };
     format!(
         "{nx} x {ny} cells ({cells}), {} velocity and rotation unknowns, {} of pressure, \
-         {} particles per cell",
-        plan.unknowns, plan.pressure_unknowns, plan.particles_per_cell
+         {} per cell",
+        plan.unknowns,
+        plan.pressure_unknowns,
+        count(plan.particles_per_cell, "particle")
     )
 }
 

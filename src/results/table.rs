@@ -2,6 +2,7 @@
 
 use crate::record::rerun_log::Sample;
 use crate::sim::row::{COLUMNS, Column, PER_GAUGE, PER_MATERIAL, Rank, find};
+use crate::words::count;
 use indexmap::IndexMap;
 use std::collections::BTreeMap;
 
@@ -32,10 +33,10 @@ impl Table {
             let cells: Vec<&str> = line.split(',').collect();
             if cells.len() != names.len() {
                 return Err(format!(
-                    "line {} has {} values for {} columns",
+                    "line {} has {} for {}",
                     number + 2,
-                    cells.len(),
-                    names.len()
+                    count(cells.len(), "value"),
+                    count(names.len(), "column")
                 ));
             }
             for (column, cell) in columns.values_mut().zip(cells) {

@@ -14,6 +14,7 @@ use toml::de::{DeTable, DeValue};
 use super::error::{MAX_ERRORS, SceneError, closest, suggestion};
 use super::source::SceneSource;
 use super::types::Scene;
+use crate::words::count;
 
 /// The version of the scene format that this program reads.
 pub const SCHEMA: u32 = 1;
@@ -108,8 +109,8 @@ fn unread(value: &Spanned<DeValue>, read: &toml::Value, errors: &mut Vec<SceneEr
         (DeValue::Table(table), toml::Value::Table(read)) => unread_in_table(table, read, errors),
         (DeValue::Array(array), toml::Value::Array(read)) => {
             if array.len() != read.len() {
-                let message = format!("a list of {} values", array.len());
-                let help = format!("expected {} values", read.len());
+                let message = format!("a list of {}", count(array.len(), "value"));
+                let help = format!("expected {}", count(read.len(), "value"));
                 errors.push(SceneError::at(&value.span(), message, help).with_label("this list"));
             }
             for (value, read) in array.iter().zip(read) {

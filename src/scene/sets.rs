@@ -8,6 +8,7 @@ use toml_edit::{Document, DocumentMut, InlineTable, Item, Table, Value};
 use super::error::{SceneError, suggestion};
 use super::load::table;
 use super::source::SceneSource;
+use crate::words::count;
 
 /// The keys of a scene with which a path may start.
 const KEYS: [&str; 24] = [
@@ -209,7 +210,7 @@ fn write(root: &mut Item, steps: &[Step], text: &str) -> Result<(), Fault> {
             Step::Index(index) => item.get_mut(*index),
         };
         let Some(next) = next else {
-            let help = format!("it has {length} elements, counted from 0");
+            let help = format!("it has {}, counted from 0", count(length, "element"));
             return fault(format!("there is no `{walked}`"), help);
         };
         item = next;

@@ -4,6 +4,7 @@ use super::fault::Fault;
 use super::initial::Unfilled;
 use crate::composition::EmptyCell;
 use crate::solve::report::SolveError;
+use crate::words::count;
 
 /// Why a run cannot start or continue.
 #[derive(Debug, thiserror::Error)]
@@ -64,7 +65,7 @@ pub enum SimError {
 
 /// Describes the repetitions of a step before the run ended.
 fn tried(cuts: u32) -> String {
-    format!("step was repeated {cuts} times, each time shorter, and failed every time")
+    format!("step was repeated {}, each time shorter, and failed every time", count(cuts, "time"))
 }
 
 impl SimError {

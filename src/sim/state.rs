@@ -7,6 +7,7 @@
 //! column; readers ask for columns by name.
 
 use super::phases::Phases;
+use crate::words::count;
 use std::collections::BTreeMap;
 
 /// A column of values of one type.
@@ -33,7 +34,7 @@ pub enum StateError {
     #[error("the state has no column `{0}`")]
     Missing(String),
     /// A column has the wrong length.
-    #[error("column `{name}` of the state has {found} values instead of {expected}")]
+    #[error("column `{name}` of the state has {} instead of {expected}", count(.found, "value"))]
     Length {
         /// Name of the column.
         name: String,

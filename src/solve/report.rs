@@ -2,6 +2,7 @@
 
 use super::multifrontal::NotPositiveDefinite;
 use crate::plan::Method;
+use crate::words::count;
 
 /// Powers below this fraction of [`Report::power_scale`] are rounding errors of a scene at rest.
 const REST: f64 = 1e-6;
@@ -107,8 +108,9 @@ pub enum SolveError {
     },
     /// The corrections did not converge.
     #[error(
-        "no convergence in {corrections} corrections: residual {residual:.1e}, \
-         divergence {divergence:.1e}; the largest error is at ({x:.4e}, {y:.4e})"
+        "no convergence in {}: residual {residual:.1e}, divergence {divergence:.1e}; the largest \
+         error is at ({x:.4e}, {y:.4e})",
+        count(.corrections, "correction")
     )]
     Stalled {
         /// Number of corrections.
@@ -124,8 +126,9 @@ pub enum SolveError {
     },
     /// The iteration for generalised fluids did not converge.
     #[error(
-        "no convergence in {iterations} iterations of the flow curves: relative error about \
-         {decrement:.1e}; the largest residual is at ({x:.4e}, {y:.4e})"
+        "no convergence in {} of the flow curves: relative error about {decrement:.1e}; the \
+         largest residual is at ({x:.4e}, {y:.4e})",
+        count(.iterations, "iteration")
     )]
     Nonlinear {
         /// Number of iterations.
@@ -138,7 +141,7 @@ pub enum SolveError {
         y: f64,
     },
     /// The residual is infinite or not a number.
-    #[error("the solution is not finite after {corrections} corrections")]
+    #[error("the solution is not finite after {}", count(.corrections, "correction"))]
     NonFinite {
         /// Number of corrections.
         corrections: u32,

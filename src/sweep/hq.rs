@@ -5,6 +5,7 @@
 //! others.
 
 use super::{Case, Engine, Event, State, SweepError, Work, environment};
+use crate::words::count;
 use indexmap::IndexMap;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -144,7 +145,7 @@ impl Engine for HyperQueue {
             .map_err(|cause| SweepError::Broken { path: file.clone(), cause })?;
         std::fs::write(&file, text).map_err(SweepError::file("write", &file))?;
         let job = self.submit(&file)?;
-        eprintln!("submitted job {job} with {} tasks", work.cases.len());
+        eprintln!("submitted job {job} with {}", count(work.cases.len(), "task"));
         let mut waiting = self
             .command(&["--output-mode=quiet", "job", "wait", &job])
             .stdout(Stdio::null())

@@ -264,7 +264,7 @@ fn a_damaged_table_loses_only_the_damaged_rows() {
     let table = here.read("run/series.csv");
     let damaged = table.replacen("\n3,", "\n3,\u{1},", 1);
     here.write("run/series.csv", &damaged);
-    here.grainscope(&["repair", "run"]).exits(0).prints(&["6 rows", "lost: 1 damaged rows"]);
+    here.grainscope(&["repair", "run"]).exits(0).prints(&["6 rows", "lost: 1 damaged row;"]);
     assert_eq!(here.read("run/series.csv.damaged"), damaged);
     assert_eq!(Table::read(&here.read("run/series.csv")).rows.len(), 6);
 }

@@ -43,7 +43,7 @@ fn ids(here: &TempFolder, sweep: &str) -> Vec<String> {
 fn a_sweep_leaves_runs_tables_and_plots_and_runs_again_only_what_is_missing() {
     let here = TempFolder::new();
     let arguments = small(&["--vary", "alpha=0,5/3", "--repeat-seeds", "2", "--out", "s"]);
-    let said = here.grainscope(&arguments).exits(0).prints(&["4 of 4 cases are done"]);
+    let said = here.grainscope(&arguments).exits(0).prints(&["done: 4 of 4 cases"]);
     assert!(said.err.contains("4 cases, 0 done before"), "{}", said.err);
     let table = Table::read(&here.read("s/table.csv"));
     assert_eq!(table.text("state"), ["done"; 4]);
@@ -110,12 +110,9 @@ fn failed_cases_do_not_stop_a_sweep_and_are_run_again() {
         "--no-recordings",
     ]);
     let said = here.grainscope(&arguments).exits(6);
-    let said = said.complains(&[
-        "1 of 2 cases are not done",
-        "background.background = false:",
-        "s/failed",
-    ]);
-    assert!(said.out.contains("1 of 2 cases are done"), "{}", said.out);
+    let said =
+        said.complains(&["not done: 1 of 2 cases", "background.background = false:", "s/failed"]);
+    assert!(said.out.contains("done: 1 of 2 cases"), "{}", said.out);
     let table = Table::read(&here.read("s/table.csv").replace(", ", " "));
     assert_eq!(table.text("state"), ["failed", "done"]);
     assert!(!table.text("cause")[0].is_empty());
@@ -307,7 +304,7 @@ fn hyperqueue_gives_the_same_states_as_local_runs() {
     cluster.sweep(&small(&arguments)).exits(1).complains(&["start a server and workers first"]);
     let _server = cluster.server();
     let _worker = cluster.worker();
-    cluster.sweep(&small(&arguments)).exits(0).prints(&["2 of 2 cases are done"]);
+    cluster.sweep(&small(&arguments)).exits(0).prints(&["done: 2 of 2 cases"]);
     let local = ["--vary", "alpha=0,1", "--out", "local", "--no-recordings"];
     here.grainscope(&small(&local)).exits(0);
     assert_eq!(hashes(&here, "hq"), hashes(&here, "local"));
@@ -351,7 +348,7 @@ fn a_sweep_survives_the_death_of_workers_and_servers() {
     drop((server, workers));
     let _server = cluster.server();
     let _workers = [cluster.worker(), cluster.worker()];
-    let said = cluster.sweep(&hq).exits(0).prints(&["6 of 6 cases are done"]);
+    let said = cluster.sweep(&hq).exits(0).prints(&["done: 6 of 6 cases"]);
     assert!(!said.err.contains("6 cases, 0 done before"), "{}", said.err);
     here.grainscope(&[&base[..], &["--out", "local"]].concat()).exits(0);
     assert_eq!(hashes(&here, "hq"), hashes(&here, "local"));

@@ -27,7 +27,7 @@ pub(super) fn collect(
         files.push(name.into());
     }
     let mut text = found.terminal();
-    text += &format!("\n{} of {} cases are done\n", found.done(), list.cases.len());
+    text += &format!("\ndone: {} of {}\n", found.done(), count(list.cases.len(), "case"));
     if side_by_side.is_some() || report {
         let cases = match side_by_side {
             Some(named) if !named.is_empty() => chosen(list, named)?,
