@@ -124,7 +124,10 @@ function entries(path) {
   const properties = propertiesOf(schemaAt(path));
   return Object.entries(properties).map(([label, part]) => {
     const meant = resolved(part);
-    const info = (part.description || meant.description || "").replace(/\s+/g, " ").trim();
+    const facts = [["unit", part["x-unit"]], ["range", part["x-range"]], ["default", part["x-default"]]];
+    const said = facts.filter(([, fact]) => fact && fact !== "1").map(([name, fact]) => `${name}: ${fact}`).join("; ");
+    const meaning = (part.description || meant.description || "").replace(/\s+/g, " ").trim();
+    const info = said ? `${meaning} (${said})` : meaning;
     const value = part.default === undefined || part.default === null ? "" : `default ${JSON.stringify(part.default)}`;
     return { label, detail: value, info };
   });

@@ -142,7 +142,7 @@ enum Command {
     Columns,
     /// Write a commented skeleton of a scene, to start from
     New(new::Args),
-    /// Print the reference of scene files as Markdown: every key, value, default and meaning
+    /// Print the reference of scene files as Markdown: every key with unit, default, range, example
     Reference,
     /// Print the JSON schema of scene files
     Schema,

@@ -16,17 +16,22 @@ use super::quantity::{Field, Quantity};
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Version of the scene format; 1.
+    #[schemars(extend("x-unit" = "1", "x-range" = "= 1", "examples" = [1]))]
     pub schema: u32,
     /// Name of the scene, used for the run folder and the recording. Letters, digits, `_`, `-`.
+    #[schemars(extend("x-range" = "1 to 100 letters, digits, `_`, `-`", "examples" = ["silo"]))]
     pub name: String,
     /// Description of the scene in one line.
     #[serde(default)]
+    #[schemars(extend("examples" = ["Discharge of a silo"]))]
     pub description: String,
-    /// Gravitational acceleration along x and y, m/s2.
+    /// Gravitational acceleration along x and y.
     #[serde(default = "zero_pair")]
+    #[schemars(extend("x-unit" = "m/s2", "x-range" = "any", "examples" = [[0, -9.81]]))]
     pub gravity: [Quantity; 2],
-    /// Whether inertia is solved; `false` (default): creeping flow.
+    /// Whether inertia is solved; `false`: creeping flow.
     #[serde(default, skip_serializing_if = "is_false")]
+    #[schemars(extend("x-default" = "`false`", "examples" = [true]))]
     pub inertia: bool,
     /// Velocity at the start; only with inertia. Absent: at rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -90,21 +95,46 @@ pub struct Scene {
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// Value used if `value` is not given; may use the parameters defined above.
+    #[schemars(extend(
+        "x-unit" = "that of the parameter",
+        "x-range" = "`min` to `max`",
+        "examples" = [0.5]
+    ))]
     pub default: Quantity,
     /// Value that `--set name=value` has set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "that of the parameter",
+        "x-range" = "`min` to `max`",
+        "x-default" = "`default`",
+        "examples" = ["5/3"]
+    ))]
     pub value: Option<Quantity>,
     /// Smallest allowed value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "that of the parameter",
+        "x-range" = "≤ `max`",
+        "x-default" = "no limit",
+        "examples" = [0]
+    ))]
     pub min: Option<Quantity>,
     /// Largest allowed value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "that of the parameter",
+        "x-range" = "≥ `min`",
+        "x-default" = "no limit",
+        "examples" = [100]
+    ))]
     pub max: Option<Quantity>,
-    /// Label of the slider in the explorer; default: the name.
+    /// Label of the slider in the explorer.
     #[serde(default)]
+    #[schemars(extend("x-default" = "the name", "examples" = ["width of the outlet"]))]
     pub label: String,
     /// Unit, for display only.
     #[serde(default)]
+    #[schemars(extend("examples" = ["m"]))]
     pub unit: String,
 }
 
@@ -112,12 +142,20 @@ pub struct Parameter {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Domain {
-    /// Range along x, m: lower and upper end.
+    /// Range along x: lower and upper end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "ascending", "examples" = [[0, 2]]))]
     pub x: [Quantity; 2],
-    /// Range along y, m: lower and upper end.
+    /// Range along y: lower and upper end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "ascending", "examples" = [[0, "height"]]))]
     pub y: [Quantity; 2],
-    /// Length that contains `accuracy.cells` cells, m; default: the shorter side of the domain.
+    /// Length that contains `accuracy.cells` cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "> 0",
+        "x-default" = "the shorter side of the domain",
+        "examples" = [0.5]
+    ))]
     pub length_scale: Option<Quantity>,
 }
 
@@ -128,15 +166,26 @@ pub struct Mesh {
     /// Positions towards which cells become smaller. Absent: the ends of walls that face each other
     /// across a gap and the ends of openings in sides, by a factor of 12; `[]`: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-default" = "12 towards apertures",
+        "examples" = [[{ "towards": "walls", "factor": 4 }]]
+    ))]
     pub grading: Option<Vec<Grading>>,
     /// Largest size ratio of neighbouring cells in graded parts.
     #[serde(default = "growth_default")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 1, ≤ 2", "examples" = [1.3]))]
     pub growth: f64,
-    /// Additional x coordinates of mesh lines, m.
+    /// Additional x coordinates of mesh lines.
     #[serde(default)]
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain",
+        "examples" = [[0.25, "aperture/2"]]
+    ))]
     pub lines_x: Vec<Quantity>,
-    /// Additional y coordinates of mesh lines, m.
+    /// Additional y coordinates of mesh lines.
     #[serde(default)]
+    #[schemars(extend("x-unit" = "m", "x-range" = "in the domain", "examples" = [[0.5]]))]
     pub lines_y: Vec<Quantity>,
 }
 
@@ -145,8 +194,10 @@ pub struct Mesh {
 #[serde(deny_unknown_fields)]
 pub struct Grading {
     /// Position towards which cells become smaller.
+    #[schemars(extend("examples" = ["walls"]))]
     pub towards: GradingTarget,
     /// Factor by which the cells there are smaller.
+    #[schemars(extend("x-unit" = "1", "x-range" = "1 to 1000", "examples" = [8]))]
     pub factor: Quantity,
 }
 
@@ -160,10 +211,18 @@ pub enum GradingTarget {
     /// All no-slip walls and sides, and sides with a given tangential velocity or rotation; a side
     /// counts if one of its parts is such.
     Walls,
-    /// A coordinate x, m.
-    X(Quantity),
-    /// A coordinate y, m.
-    Y(Quantity),
+    /// A coordinate x.
+    X(
+        /// Coordinate x.
+        #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [0.5]))]
+        Quantity,
+    ),
+    /// A coordinate y.
+    Y(
+        /// Coordinate y.
+        #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [0.5]))]
+        Quantity,
+    ),
 }
 
 /// A material. It is a Cosserat material if it has a coupling viscosity and an internal length (or
@@ -172,67 +231,147 @@ pub enum GradingTarget {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// Density, kg/m3; may depend on x and y, and is then carried by the particles.
+    /// Density; may depend on x and y, and is then carried by the particles.
     #[serde(default = "zero_field")]
+    #[schemars(extend("x-unit" = "kg/m3", "x-range" = "≥ 0", "examples" = [1600]))]
     pub density: Field,
-    /// Shear viscosity eta, Pa s; may depend on x and y, and is then carried by the particles.
+    /// Shear viscosity eta; may depend on x and y, and is then carried by the particles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa s",
+        "x-range" = "> 0",
+        "x-default" = "from `friction` or `granular`",
+        "examples" = ["100 * exp(-2*y)"]
+    ))]
     pub shear_viscosity: Option<Field>,
-    /// Bulk viscosity B, Pa s; absent: incompressible.
+    /// Bulk viscosity B.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa s",
+        "x-range" = "> 0",
+        "x-default" = "incompressible",
+        "examples" = [1e4]
+    ))]
     pub bulk_viscosity: Option<Quantity>,
-    /// Coupling viscosity eta_c, Pa s.
+    /// Coupling viscosity eta_c.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa s",
+        "x-range" = "≥ 0",
+        "x-default" = "`0`",
+        "examples" = [50]
+    ))]
     pub coupling_viscosity: Option<Quantity>,
-    /// Internal length R, m, with M = 2 eta_c R^2.
+    /// Internal length R, with M = 2 eta_c R^2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "≥ 0",
+        "x-default" = "no rotation",
+        "examples" = [0.02]
+    ))]
     pub internal_length: Option<Quantity>,
-    /// Couple viscosity M, Pa s m2, instead of an internal length.
+    /// Couple viscosity M, instead of an internal length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa s m2",
+        "x-range" = "≥ 0",
+        "x-default" = "from `internal_length`",
+        "examples" = [0.1]
+    ))]
     pub couple_viscosity: Option<Quantity>,
-    /// Viscosity eta_s of shear along the layers, whose normal is the director, Pa s.
+    /// Viscosity eta_s of shear along the layers, whose normal is the director.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa s",
+        "x-range" = "> 0",
+        "x-default" = "no layers",
+        "examples" = [1]
+    ))]
     pub layer_viscosity: Option<Quantity>,
-    /// Coupling viscosity over shear viscosity, eta_c/eta, instead of a coupling viscosity. Default
-    /// 1 for a material with friction, a yield stress or a flow index and an internal length.
+    /// Coupling viscosity over shear viscosity, eta_c/eta, instead of a coupling viscosity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1",
+        "x-range" = "≥ 0",
+        "x-default" = "from `coupling_viscosity`; with a flow curve and an internal length 1",
+        "examples" = [0.5]
+    ))]
     pub coupling_ratio: Option<Quantity>,
     /// Viscosity of shear along the layers over shear viscosity, eta_s/eta, for a material with
     /// friction, a yield stress or a flow index.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1",
+        "x-range" = "> 0",
+        "x-default" = "no layers",
+        "examples" = [0.1]
+    ))]
     pub layer_ratio: Option<Quantity>,
     /// Friction of grains, tau = c + mu(I) p, instead of a viscosity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-default" = "none",
+        "examples" = [{ "static": 0.38, "dynamic": 0.64, "grain_diameter": 1e-3 }]
+    ))]
     pub friction: Option<Friction>,
-    /// Cohesion c of grains with friction, Pa; default 0.
+    /// Cohesion c of grains with friction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "Pa", "x-range" = "≥ 0", "x-default" = "`0`", "examples" = [20]))]
     pub cohesion: Option<Quantity>,
-    /// Yield stress tau_y, Pa. With it or `flow_index` the material follows tau = tau_y + K g^n, and
-    /// `shear_viscosity` is the consistency K, Pa s^n (Herschel and Bulkley); default 0.
+    /// Yield stress tau_y. With it or `flow_index` the material follows tau = tau_y + K g^n, and
+    /// `shear_viscosity` is the consistency K, Pa s^n (Herschel and Bulkley).
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "Pa", "x-range" = "≥ 0", "x-default" = "`0`", "examples" = [50]))]
     pub yield_stress: Option<Quantity>,
-    /// Flow index n, 0.05 to 5; default 1, a Bingham fluid.
+    /// Flow index n; 1: a Bingham fluid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1",
+        "x-range" = "0.05 to 5",
+        "x-default" = "`1`",
+        "examples" = [0.5]
+    ))]
     pub flow_index: Option<Quantity>,
-    /// Largest viscosity of a material with friction, a yield stress or a flow index, Pa s: that of
-    /// material at rest. Default: 1e4 rho sqrt(g H^3) with the height H of its regions; with a yield
-    /// stress at least 1e4 K.
+    /// Largest viscosity of a material with friction, a yield stress or a flow index: that of
+    /// material at rest. Its default depends on the height H of its regions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa s",
+        "x-range" = "> 0",
+        "x-default" = "1e4 rho sqrt(g H^3); with a yield stress at least 1e4 K",
+        "examples" = [1e6]
+    ))]
     pub largest_viscosity: Option<Quantity>,
-    /// Smallest viscosity of such a material, Pa s: that of grains without pressure and cohesion.
-    /// Default: the viscosity of the background, or 1e-8 of the largest without one.
+    /// Smallest viscosity of such a material: that of grains without pressure and cohesion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa s",
+        "x-range" = "> 0; ≤ `largest_viscosity`",
+        "x-default" = "that of the background, or 1e-8 of the largest",
+        "examples" = [0.1]
+    ))]
     pub smallest_viscosity: Option<Quantity>,
     /// Contact parameters of grains from which the viscosities are computed, instead of giving
     /// them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-default" = "none",
+        "examples" = [{ "porosity": 0.4, "coordination": 6, "normal_dashpot": 10, "tangential_dashpot": 5 }]
+    ))]
     pub granular: Option<Granular>,
     /// Whether the material fills the part of the domain outside all regions; such a material
     /// carries no history and is not drawn.
     #[serde(default)]
+    #[schemars(extend("examples" = [true]))]
     pub background: bool,
-    /// Colour in pictures, `#rrggbb`; default: from a palette for colour-blind readers.
+    /// Colour in pictures, `#rrggbb`. The palette is one for colour-blind readers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "six hexadecimal digits",
+        "x-default" = "from a palette",
+        "examples" = ["#e69f00"]
+    ))]
     pub colour: Option<String>,
 }
 
@@ -243,17 +382,32 @@ pub struct Material {
 pub struct Friction {
     /// Coefficient of friction at rest, mu_s.
     #[serde(rename = "static")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "≥ 0", "examples" = [0.38]))]
     pub at_rest: Quantity,
-    /// Coefficient of friction at large rates, mu_2; default: that at rest.
+    /// Coefficient of friction at large rates, mu_2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1",
+        "x-range" = "≥ 0; ≥ `static`",
+        "x-default" = "`static`",
+        "examples" = [0.64]
+    ))]
     pub dynamic: Option<Quantity>,
     /// Inertial number I_0 at which the coefficient is halfway between the two.
     #[serde(default = "inertial_number_default")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0", "examples" = [0.279]))]
     pub inertial_number: Quantity,
-    /// Diameter d of the grains, m.
+    /// Diameter d of the grains.
+    #[schemars(extend("x-unit" = "m", "x-range" = "≥ 0", "examples" = [1e-3]))]
     pub grain_diameter: Quantity,
-    /// Density rho_s of the grain material, kg/m3; default: the density of the material.
+    /// Density rho_s of the grain material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "kg/m3",
+        "x-range" = "> 0",
+        "x-default" = "`density`",
+        "examples" = [2500]
+    ))]
     pub grain_density: Option<Quantity>,
 }
 
@@ -261,16 +415,21 @@ pub struct Friction {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Granular {
-    /// Porosity n, 0 to 1.
+    /// Porosity n.
+    #[schemars(extend("x-unit" = "1", "x-range" = "≥ 0, < 1", "examples" = [0.4]))]
     pub porosity: Quantity,
     /// Coordination number k, contacts per grain.
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0", "examples" = [6]))]
     pub coordination: Quantity,
-    /// Viscosity eta_n of a contact in the normal direction, Pa s.
+    /// Viscosity eta_n of a contact in the normal direction.
+    #[schemars(extend("x-unit" = "Pa s", "x-range" = "> 0", "examples" = [10]))]
     pub normal_dashpot: Quantity,
-    /// Viscosity eta_m of a contact in the tangential direction, Pa s.
+    /// Viscosity eta_m of a contact in the tangential direction.
+    #[schemars(extend("x-unit" = "Pa s", "x-range" = "≥ 0", "examples" = [5]))]
     pub tangential_dashpot: Quantity,
-    /// `true` (default): incompressible; `false`: bulk viscosity B from equation (16).
+    /// `true`: incompressible; `false`: bulk viscosity B from equation (16).
     #[serde(default = "yes")]
+    #[schemars(extend("examples" = [false]))]
     pub incompressible: bool,
 }
 
@@ -279,12 +438,15 @@ pub struct Granular {
 #[serde(deny_unknown_fields)]
 pub struct Region {
     /// Name of the material.
+    #[schemars(extend("x-range" = "a material", "examples" = ["sand"]))]
     pub material: String,
     /// Shape of the region.
     #[serde(default)]
+    #[schemars(extend("examples" = [{ "circle": { "centre": [0, 1], "radius": 0.3 } }]))]
     pub shape: Shape,
     /// Initial directors; required for a layered material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "none", "examples" = [{ "angle_degrees": 45 }]))]
     pub director: Option<Director>,
 }
 
@@ -296,29 +458,59 @@ pub enum Shape {
     #[default]
     Everywhere,
     /// An axis-aligned rectangle.
+    #[schemars(extend("examples" = [{ "x": [0, 1], "y": [0, 0.5] }]))]
     Rectangle {
-        /// Range along x, m: lower and upper end.
+        /// Range along x: lower and upper end.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "in the domain; ascending",
+            "examples" = [[0, 1]]
+        ))]
         x: [Quantity; 2],
-        /// Range along y, m: lower and upper end.
+        /// Range along y: lower and upper end.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "in the domain; ascending",
+            "examples" = [[0, "height/2"]]
+        ))]
         y: [Quantity; 2],
     },
     /// A circle.
+    #[schemars(extend("examples" = [{ "centre": [0.5, 0.5], "radius": 0.25 }]))]
     Circle {
-        /// Coordinates x and y of the centre, m.
+        /// Coordinates x and y of the centre.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "any; the circle must touch the domain",
+            "examples" = [[0.5, 0.5]]
+        ))]
         centre: [Quantity; 2],
-        /// Radius, m.
+        /// Radius.
+        #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "examples" = [0.25]))]
         radius: Quantity,
     },
     /// The points where the expression in x and y is above zero (comparisons give 1 or 0).
-    Where(Field),
+    Where(
+        /// Above zero inside the region; comparisons give 1 or 0.
+        #[schemars(extend(
+            "x-unit" = "1",
+            "x-range" = "any",
+            "examples" = ["y < 0.5 + 0.1*cos(pi*x)"]
+        ))]
+        Field,
+    ),
 }
 
 /// Initial directors of a layered material.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Director {
-    /// Angle between the layer normal and the x axis, degrees; may depend on x and y.
-    AngleDegrees(Field),
+    /// Angle between the layer normal and the x axis; may depend on x and y.
+    AngleDegrees(
+        /// Angle between the layer normal and the x axis; may depend on x and y.
+        #[schemars(extend("x-unit" = "degrees", "x-range" = "any", "examples" = ["90*x"]))]
+        Field,
+    ),
     /// Random directions, uniformly distributed over all angles and evenly over neighbouring
     /// particles; seeded by `accuracy.seed`.
     Random,
@@ -330,15 +522,19 @@ pub enum Director {
 pub struct Boundaries {
     /// Left side.
     #[serde(default)]
+    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
     pub left: Boundary,
     /// Right side.
     #[serde(default)]
+    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
     pub right: Boundary,
     /// Lower side.
     #[serde(default)]
+    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
     pub bottom: Boundary,
     /// Upper side.
     #[serde(default)]
+    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
     pub top: Boundary,
 }
 
@@ -355,25 +551,60 @@ impl Boundaries {
 pub struct Boundary {
     /// Kind of boundary condition.
     #[serde(default)]
+    #[schemars(extend("examples" = ["no_slip"]))]
     pub kind: BoundaryKind,
-    /// Prescribed velocity along x, m/s; may depend on x and y.
+    /// Prescribed velocity along x; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m/s",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = [0.1]
+    ))]
     pub velocity_x: Option<Field>,
-    /// Prescribed velocity along y, m/s; may depend on x and y.
+    /// Prescribed velocity along y; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m/s",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = ["0.1 * (1 - x^2)"]
+    ))]
     pub velocity_y: Option<Field>,
-    /// Prescribed traction on the fluid along x, Pa; excludes `velocity_x`.
+    /// Prescribed traction on the fluid along x; excludes `velocity_x`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = [0]
+    ))]
     pub traction_x: Option<Field>,
-    /// Prescribed traction on the fluid along y, Pa; excludes `velocity_y`.
+    /// Prescribed traction on the fluid along y; excludes `velocity_y`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = [-1e3]
+    ))]
     pub traction_y: Option<Field>,
-    /// Prescribed Cosserat rotation rate, 1/s; absent: free (no couple).
+    /// Prescribed Cosserat rotation rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1/s",
+        "x-range" = "any",
+        "x-default" = "free (no couple)",
+        "examples" = [0]
+    ))]
     pub rotation: Option<Field>,
     /// Parts of the side with other conditions, such as openings; the rest of the side is as the
     /// keys above say.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend(
+        "x-default" = "none",
+        "examples" = [[{ "from": 0.2, "to": 0.4, "kind": "outflow" }]]
+    ))]
     pub parts: Vec<BoundaryPart>,
 }
 
@@ -383,27 +614,60 @@ pub struct Boundary {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryPart {
-    /// Coordinate of the lower or left end along the side, m: x at the bottom and top, y at the
+    /// Coordinate of the lower or left end along the side: x at the bottom and top, y at the
     /// left and right.
+    #[schemars(extend("x-unit" = "m", "x-range" = "on the side; < `to`", "examples" = [0.2]))]
     pub from: Quantity,
-    /// Coordinate of the upper or right end along the side, m.
+    /// Coordinate of the upper or right end along the side.
+    #[schemars(extend("x-unit" = "m", "x-range" = "on the side; > `from`", "examples" = [0.4]))]
     pub to: Quantity,
     /// Kind of boundary condition; not `periodic`.
+    #[schemars(extend("examples" = ["outflow"]))]
     pub kind: BoundaryKind,
-    /// Prescribed velocity along x, m/s; may depend on x and y.
+    /// Prescribed velocity along x; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m/s",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = [0.1]
+    ))]
     pub velocity_x: Option<Field>,
-    /// Prescribed velocity along y, m/s; may depend on x and y.
+    /// Prescribed velocity along y; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m/s",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = ["0.1 * (1 - x^2)"]
+    ))]
     pub velocity_y: Option<Field>,
-    /// Prescribed traction on the fluid along x, Pa; excludes `velocity_x`.
+    /// Prescribed traction on the fluid along x; excludes `velocity_x`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = [0]
+    ))]
     pub traction_x: Option<Field>,
-    /// Prescribed traction on the fluid along y, Pa; excludes `velocity_y`.
+    /// Prescribed traction on the fluid along y; excludes `velocity_y`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "Pa",
+        "x-range" = "any",
+        "x-default" = "by `kind`",
+        "examples" = [-1e3]
+    ))]
     pub traction_y: Option<Field>,
-    /// Prescribed Cosserat rotation rate, 1/s; absent: free (no couple).
+    /// Prescribed Cosserat rotation rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1/s",
+        "x-range" = "any",
+        "x-default" = "free (no couple)",
+        "examples" = [0]
+    ))]
     pub rotation: Option<Field>,
 }
 
@@ -468,16 +732,30 @@ pub enum BoundaryKind {
 #[serde(deny_unknown_fields)]
 pub struct Wall {
     /// Name of the wall.
+    #[schemars(extend("examples" = ["floor"]))]
     pub name: String,
-    /// Coordinates x and y of one end, m.
+    /// Coordinates x and y of one end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "in the domain", "examples" = [[0, 0.5]]))]
     pub from: [Quantity; 2],
-    /// Coordinates x and y of the other end, m.
+    /// Coordinates x and y of the other end.
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain; `x` or `y` as in `from`",
+        "examples" = [["aperture", 0.5]]
+    ))]
     pub to: [Quantity; 2],
     /// Kind of boundary condition on both faces.
     #[serde(default)]
+    #[schemars(extend("examples" = ["no_slip"]))]
     pub kind: WallKind,
-    /// Prescribed Cosserat rotation rate on the wall, 1/s; absent: free (no couple).
+    /// Prescribed Cosserat rotation rate on the wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1/s",
+        "x-range" = "any",
+        "x-default" = "free (no couple)",
+        "examples" = [0]
+    ))]
     pub rotation: Option<Quantity>,
 }
 
@@ -497,13 +775,25 @@ pub enum WallKind {
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// Name of the block.
+    #[schemars(extend("examples" = ["step"]))]
     pub name: String,
-    /// Range along x, m: lower and upper end.
+    /// Range along x: lower and upper end.
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain; ascending",
+        "examples" = [[0, 0.5]]
+    ))]
     pub x: [Quantity; 2],
-    /// Range along y, m: lower and upper end.
+    /// Range along y: lower and upper end.
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain; ascending",
+        "examples" = [[0, 0.25]]
+    ))]
     pub y: [Quantity; 2],
     /// Kind of boundary condition on its faces.
     #[serde(default)]
+    #[schemars(extend("examples" = ["no_slip"]))]
     pub kind: WallKind,
 }
 
@@ -511,11 +801,17 @@ pub struct Block {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InitialVelocity {
-    /// Velocity along x, m/s; may depend on x and y.
+    /// Velocity along x; may depend on x and y.
     #[serde(default = "zero_field")]
+    #[schemars(extend("x-unit" = "m/s", "x-range" = "any", "examples" = ["sin(pi*x) * cos(pi*y)"]))]
     pub x: Field,
-    /// Velocity along y, m/s; may depend on x and y.
+    /// Velocity along y; may depend on x and y.
     #[serde(default = "zero_field")]
+    #[schemars(extend(
+        "x-unit" = "m/s",
+        "x-range" = "any",
+        "examples" = ["-cos(pi*x) * sin(pi*y)"]
+    ))]
     pub y: Field,
 }
 
@@ -523,10 +819,16 @@ pub struct InitialVelocity {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PressureReference {
-    /// Coordinates x and y of the point, m.
+    /// Coordinates x and y of the point.
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain; outside blocks",
+        "examples" = [[0.5, 1]]
+    ))]
     pub at: [Quantity; 2],
-    /// Pressure at the point, Pa.
+    /// Pressure at the point.
     #[serde(default = "zero")]
+    #[schemars(extend("x-unit" = "Pa", "x-range" = "any", "examples" = [1e5]))]
     pub value: Quantity,
 }
 
@@ -534,14 +836,17 @@ pub struct PressureReference {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyForce {
-    /// Force per volume along x, N/m3; may depend on x and y.
+    /// Force per volume along x; may depend on x and y.
     #[serde(default = "zero_field")]
+    #[schemars(extend("x-unit" = "N/m3", "x-range" = "any", "examples" = ["100*sin(pi*y)"]))]
     pub x: Field,
-    /// Force per volume along y, N/m3; may depend on x and y.
+    /// Force per volume along y; may depend on x and y.
     #[serde(default = "zero_field")]
+    #[schemars(extend("x-unit" = "N/m3", "x-range" = "any", "examples" = [-50]))]
     pub y: Field,
-    /// Couple per volume, N m/m3, which acts on the Cosserat rotation; may depend on x and y.
+    /// Couple per volume, which acts on the Cosserat rotation; may depend on x and y.
     #[serde(default = "zero_field")]
+    #[schemars(extend("x-unit" = "N m/m3", "x-range" = "any", "examples" = [2]))]
     pub couple: Field,
 }
 
@@ -549,11 +854,13 @@ pub struct BodyForce {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Acceleration {
-    /// Acceleration along x, m/s2; may depend on x and y.
+    /// Acceleration along x; may depend on x and y.
     #[serde(default = "zero_field")]
+    #[schemars(extend("x-unit" = "m/s2", "x-range" = "any", "examples" = ["4*x"]))]
     pub x: Field,
-    /// Acceleration along y, m/s2; may depend on x and y.
+    /// Acceleration along y; may depend on x and y.
     #[serde(default = "zero_field")]
+    #[schemars(extend("x-unit" = "m/s2", "x-range" = "any", "examples" = [-9.81]))]
     pub y: Field,
 }
 
@@ -562,14 +869,23 @@ pub struct Acceleration {
 #[serde(deny_unknown_fields)]
 pub struct Gauge {
     /// Name of the gauge.
+    #[schemars(extend("examples" = ["outlet"]))]
     pub name: String,
-    /// Coordinates x and y of one end, m.
+    /// Coordinates x and y of one end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "in the domain", "examples" = [[0.9, 0.5]]))]
     pub from: [Quantity; 2],
-    /// Coordinates x and y of the other end, m.
+    /// Coordinates x and y of the other end.
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain; `x` or `y` as in `from`",
+        "examples" = [[1.1, 0.5]]
+    ))]
     pub to: [Quantity; 2],
     /// Direction in which crossing counts as positive.
+    #[schemars(extend("x-range" = "across the segment", "examples" = ["down"]))]
     pub direction: Direction,
     /// Name of the material that is measured.
+    #[schemars(extend("x-range" = "a material", "examples" = ["sand"]))]
     pub material: String,
 }
 
@@ -581,15 +897,19 @@ pub struct Gauge {
 #[serde(deny_unknown_fields)]
 pub struct Interest {
     /// Quantity whose error is measured.
+    #[schemars(extend("examples" = [{ "gauge": "outlet" }]))]
     pub quantity: Interesting,
     /// Instant at which the quantity is evaluated.
     #[serde(default)]
+    #[schemars(extend("examples" = ["end"]))]
     pub at: Moment,
     /// Norm used for fields.
     #[serde(default)]
+    #[schemars(extend("examples" = ["max"]))]
     pub norm: Norm,
-    /// Smallest reference value for the relative error, in the unit of the quantity.
+    /// Smallest reference value for the relative error.
     #[serde(default = "zero")]
+    #[schemars(extend("x-unit" = "that of the quantity", "x-range" = "any", "examples" = [1e-3]))]
     pub floor: Quantity,
 }
 
@@ -598,9 +918,17 @@ pub struct Interest {
 #[serde(rename_all = "snake_case")]
 pub enum Interesting {
     /// Volume that has crossed the gauge with this name, m2.
-    Gauge(String),
+    Gauge(
+        /// Name of the gauge whose volume is meant.
+        #[schemars(extend("x-range" = "a gauge", "examples" = ["outlet"]))]
+        String,
+    ),
     /// Rate at which volume crosses the gauge with this name, m2/s.
-    Rate(String),
+    Rate(
+        /// Name of the gauge whose rate is meant.
+        #[schemars(extend("x-range" = "a gauge", "examples" = ["outlet"]))]
+        String,
+    ),
     /// Root-mean-square speed over the domain, m/s.
     RmsSpeed,
     /// Largest speed, m/s.
@@ -661,12 +989,18 @@ pub enum Direction {
 pub struct Dye {
     /// Grid of dye lines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-default" = "none",
+        "examples" = [{ "x": [0, 1], "y": [0, 1], "spacing": 0.1 }]
+    ))]
     pub grid: Option<DyeGrid>,
-    /// Single dye lines, each a list of points (x, y), m.
+    /// Single dye lines, each a list of points (x, y).
     #[serde(default)]
+    #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [[[[0, 0.5], [1, 0.5]]]]))]
     pub lines: Vec<Vec<[Quantity; 2]>>,
     /// Segments; particles within `width/2` of one are drawn in another colour.
     #[serde(default)]
+    #[schemars(extend("examples" = [[{ "from": [0, 0], "to": [1, 0], "width": 0.05 }]]))]
     pub marks: Vec<DyeMark>,
 }
 
@@ -674,11 +1008,18 @@ pub struct Dye {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DyeGrid {
-    /// Range along x, m: x0 and upper end.
+    /// Range along x: x0 and upper end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [[0, 2]]))]
     pub x: [Quantity; 2],
-    /// Range along y, m: y0 and upper end.
+    /// Range along y: y0 and upper end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [[0, 1]]))]
     pub y: [Quantity; 2],
-    /// Distance between lines, m.
+    /// Distance between lines.
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "> 0; at most 1000 lines each way",
+        "examples" = [0.1]
+    ))]
     pub spacing: Quantity,
 }
 
@@ -686,11 +1027,14 @@ pub struct DyeGrid {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DyeMark {
-    /// Coordinates x and y of one end, m.
+    /// Coordinates x and y of one end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [[0, 0.5]]))]
     pub from: [Quantity; 2],
-    /// Coordinates x and y of the other end, m.
+    /// Coordinates x and y of the other end.
+    #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [[1, 0.5]]))]
     pub to: [Quantity; 2],
-    /// Width of the marked strip, m.
+    /// Width of the marked strip.
+    #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "examples" = [0.05]))]
     pub width: Quantity,
 }
 
@@ -698,27 +1042,43 @@ pub struct DyeMark {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
-    /// End time, s; required unless the flow is steady.
+    /// End time; required unless the flow is steady.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "s",
+        "x-range" = "> 0",
+        "x-default" = "required unless `steady`",
+        "examples" = [10]
+    ))]
     pub end: Option<Quantity>,
     /// Whether only the flow of the initial layout is solved, to its steady state: no material
     /// moves and no time passes, so the other keys of `[time]` are not used. Not with inertia.
     #[serde(default, skip_serializing_if = "is_false")]
+    #[schemars(extend("x-default" = "`false`", "examples" = [true]))]
     pub steady: bool,
-    /// Largest time step, s.
+    /// Largest time step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "s",
+        "x-range" = "> 0",
+        "x-default" = "no limit",
+        "examples" = [0.05]
+    ))]
     pub max_step: Option<Quantity>,
     /// Largest error of the displacements of the materials of interest (all but the background) in
-    /// a step, in cells. It determines the step unless `courant`, `strain` or `max_step` demand a
+    /// a step. It determines the step unless `courant`, `strain` or `max_step` demand a
     /// shorter one.
     #[serde(default = "step_tolerance_default")]
+    #[schemars(extend("x-unit" = "cells", "x-range" = "> 0, ≤ 1", "examples" = [0.05]))]
     pub tolerance: f64,
     /// Largest number of cells that the materials of interest cross in a step (Courant number);
     /// cells made smaller by grading count less.
     #[serde(default = "courant_default")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0, ≤ 50", "examples" = [1]))]
     pub courant: f64,
     /// Largest strain of layered material in a step.
     #[serde(default = "strain_default")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0, ≤ 10", "examples" = [0.1]))]
     pub strain: f64,
 }
 
@@ -727,28 +1087,46 @@ pub struct Time {
 #[serde(deny_unknown_fields, default)]
 pub struct Accuracy {
     /// Number of cells per `domain.length_scale`.
+    #[schemars(extend(
+        "x-unit" = "1",
+        "x-range" = "≥ 1; at most 4096 along a side, 1000000 in all",
+        "examples" = [64]
+    ))]
     pub cells: u32,
-    /// Number of particles per cell at the start; a square number.
+    /// Number of particles per cell at the start.
+    #[schemars(extend("x-unit" = "1", "x-range" = "1 to 1024; a square", "examples" = [25]))]
     pub particles_per_cell: u32,
     /// Positions of the particles at the start.
+    #[schemars(extend("examples" = ["jittered"]))]
     pub placement: Placement,
     /// Quadrature in cells.
+    #[schemars(extend("examples" = ["laminate"]))]
     pub quadrature: Quadrature,
     /// Time integration scheme.
+    #[schemars(extend("examples" = ["midpoint"]))]
     pub integrator: Integrator,
     /// Fraction of the next step by which the load of a stable stratification (heavy below light)
     /// is evaluated ahead, so that large steps do not oscillate: 0.6 to 1; 0 switches it off. It
     /// acts only in scenes with gravity and more than one density, and does not change the order in
     /// time.
+    #[schemars(extend(
+        "x-unit" = "steps",
+        "x-range" = "0 to 2",
+        "examples" = [1]
+    ))]
     pub stabilisation: f64,
     /// Tolerance of the solver for the relative residual and the relative divergence.
+    #[schemars(extend("x-unit" = "1", "x-range" = "1e-14 to 1e-2", "examples" = [1e-10]))]
     pub tolerance: f64,
     /// Tolerance of the iteration for materials with friction, a yield stress or a flow index: the
     /// estimated error of the flow relative to the flow, in the norm of the dissipated power.
+    #[schemars(extend("x-unit" = "1", "x-range" = "1e-10 to 0.1", "examples" = [1e-4]))]
     pub nonlinear_tolerance: f64,
     /// Largest number of corrections (iterations) before the solver reports no convergence.
+    #[schemars(extend("x-unit" = "1", "x-range" = "1 to 10000", "examples" = [100]))]
     pub max_corrections: u32,
     /// Seed of the random numbers.
+    #[schemars(extend("x-unit" = "1", "x-range" = "≥ 0", "examples" = [2]))]
     pub seed: u64,
 }
 
@@ -798,17 +1176,31 @@ pub enum Integrator {
 #[serde(deny_unknown_fields, default)]
 pub struct Recording {
     /// Number of frames at equal intervals over the run, in addition to the first.
+    #[schemars(extend("x-unit" = "1", "x-range" = "0 to 1000000", "examples" = [50]))]
     pub frames: u32,
-    /// Additional times of frames, s; the run steps to them exactly.
+    /// Additional times of frames; the run steps to them exactly.
+    #[schemars(extend(
+        "x-unit" = "s",
+        "x-range" = "≥ 0; ≤ `time.end`",
+        "examples" = [[0.5, "2*period"]]
+    ))]
     pub times: Vec<Quantity>,
     /// Quantity that colours the particles.
+    #[schemars(extend("examples" = ["speed"]))]
     pub colour_by: ColourBy,
     /// Largest number of particles per frame. If there are more, only every k-th one is written,
     /// and the summary states this.
+    #[schemars(extend("x-unit" = "1", "x-range" = "≥ 0", "examples" = [100000]))]
     pub max_particles: u32,
     /// Fields written on a grid in each frame.
+    #[schemars(extend("examples" = [["speed", "pressure"]]))]
     pub fields: Vec<FieldName>,
     /// Number of director strokes across the width of the domain.
+    #[schemars(extend(
+        "x-unit" = "1",
+        "x-range" = "≥ 0; at most 2000 along the longer side",
+        "examples" = [48]
+    ))]
     pub glyphs: u32,
 }
 
@@ -860,14 +1252,31 @@ pub enum FieldName {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Change {
-    /// Time of the change, s; excludes `step`.
+    /// Time of the change; excludes `step`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "s",
+        "x-range" = "ascending",
+        "x-default" = "none",
+        "examples" = [0.5]
+    ))]
     pub time: Option<Quantity>,
     /// Number of the step of the change; excludes `time`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1",
+        "x-range" = "≥ 0; ascending",
+        "x-default" = "none",
+        "examples" = [100]
+    ))]
     pub step: Option<u64>,
     /// New values: parameters by name, other keys by path, for example
     /// `{ alpha = 0.5, "materials.grains.density" = 1e6, "gravity[1]" = -5 }`.
+    #[schemars(extend(
+        "x-unit" = "as the key",
+        "x-range" = "as the key",
+        "examples" = [{ "alpha": 0.5, "gravity[1]": -5 }]
+    ))]
     pub set: IndexMap<String, Quantity>,
 }
 
