@@ -36,6 +36,7 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
         EffectKind::Rotation => {
             for m in s.materials.values_mut() {
                 (m.internal_length, m.couple_viscosity) = (None, None);
+                m.layer_internal_length = None;
             }
             let b = &mut s.boundaries;
             for side in [&mut b.left, &mut b.right, &mut b.bottom, &mut b.top] {
@@ -44,7 +45,9 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
             s.walls.iter_mut().for_each(|w| w.rotation = None);
         }
         EffectKind::Directors => {
-            s.materials.values_mut().for_each(|m| m.layer_viscosity = None);
+            for m in s.materials.values_mut() {
+                (m.layer_viscosity, m.layer_internal_length) = (None, None);
+            }
             s.regions.iter_mut().for_each(|r| r.director = None);
         }
         EffectKind::Stabilisation => s.accuracy.stabilisation = 0.0,

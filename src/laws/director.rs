@@ -49,12 +49,15 @@ pub fn double_angle([nx, ny]: [f64; 2]) -> (f64, f64) {
     (2.0 * nx * ny, nx * nx - ny * ny)
 }
 
-/// Weighted mean of `m m^T`, `m = (sin 2th, -cos 2th)`, over directors.
+/// Weighted means of `m m^T`, `m = (sin 2th, -cos 2th)`, and of `t t^T`, `t = (-sin th, cos th)`,
+/// over directors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Orientation {
     weight: f64,
     ss: f64,
     sc: f64,
+    s: f64,
+    c: f64,
 }
 
 impl Orientation {
@@ -71,6 +74,8 @@ impl Orientation {
         self.weight += weight;
         self.ss += weight * s * s;
         self.sc += weight * s * c;
+        self.s += weight * s;
+        self.c += weight * c;
     }
 
     /// The mean of `m m^T`; zero without directors.
@@ -80,5 +85,14 @@ impl Orientation {
         }
         let ss = self.ss / self.weight;
         Sym2 { a: ss, b: 1.0 - ss, c: -self.sc / self.weight }
+    }
+
+    /// The mean of `t t^T`, `t` the unit vector along the layers; zero without directors.
+    pub fn along(&self) -> Sym2 {
+        if self.weight == 0.0 {
+            return Sym2::default();
+        }
+        let [s, c] = [self.s, self.c].map(|v| 0.5 * v / self.weight);
+        Sym2 { a: 0.5 - c, b: 0.5 + c, c: -s }
     }
 }

@@ -13,6 +13,15 @@
 //! ```
 //! The eigenvalues of `S` are `eta` and `eta_s`. If several directors contribute to a point, the
 //! mean of `m m^T` is used.
+//!
+//! Layers that bend have a couple viscosity of their own: with the unit vector `t = (-sin th, cos th)`
+//! along the layers, the internal length `R` across and `R_l` along the layers, the couple stress is
+//!
+//! ```text
+//! mu = [M I + (M_l - M) t t^T] grad w,   M = 2 eta_c R^2,   M_l = 2 eta_c R_l^2
+//! ```
+//! Bent layers have a rotation that varies along them. If several directors contribute to a point,
+//! the mean of `t t^T` is used.
 
 use super::director::Orientation;
 use super::point::Sym2;
@@ -23,4 +32,14 @@ pub fn shear(eta: f64, eta_s: f64, orientation: &Orientation) -> Sym2 {
     let de = eta - eta_s;
     shear.add_scaled(-de, &orientation.projector());
     shear
+}
+
+/// Couple viscosity matrix `(M_l - M) t t^T` of the bending of layers, Pa s m2; `difference` is
+/// `M_l - M`.
+pub fn bending(difference: f64, orientation: &Orientation) -> Sym2 {
+    let mut bending = Sym2::default();
+    if difference != 0.0 {
+        bending.add_scaled(difference, &orientation.along());
+    }
+    bending
 }

@@ -15,7 +15,8 @@ fn shifted(s: &Sym2, f: f64) -> Sym2 {
 /// - Coupling viscosity: arithmetic mean, each material weighted by its share of the shear,
 ///   `eta_c = sum phi_m eta_c,m eta / eta_m`: where the weak material takes the strain, the stiff
 ///   material has little spin to couple to.
-/// - Couple viscosity: arithmetic mean, `M = sum phi_m M_m`, so that the natural (moment-free)
+/// - Couple viscosity: arithmetic mean, `M = sum phi_m M_m`, likewise the matrix of the bending of
+///   layers, so that the natural (moment-free)
 ///   boundary condition at the edge of a Cosserat material is that of its own share of the cell.
 ///
 /// With an unweighted mean of `eta_c`, a drop of Cosserat fluid in a fluid a thousand times thinner
@@ -38,6 +39,7 @@ pub struct Mixture {
     /// The sum of `phi_m eta_c,m / eta_m`.
     coupling: f64,
     couple: f64,
+    bending: Sym2,
 }
 
 impl Mixture {
@@ -59,6 +61,7 @@ impl Mixture {
     /// Adds a material with the volume fraction `phi`.
     pub fn add(&mut self, phi: f64, law: &PointLaw) {
         self.couple += phi * law.couple;
+        self.bending.add_scaled(phi, &law.bending);
         if self.parallel {
             self.shear.add_scaled(phi, &law.shear);
             self.dilation_share += phi * law.dilation;
@@ -80,7 +83,8 @@ impl Mixture {
         if self.parallel {
             let (shear, dilation) = (self.shear, self.dilation_share);
             let coupling = self.coupling / self.fluidity;
-            return PointLaw { shear, dilation, coupling, couple: self.couple };
+            let (couple, bending) = (self.couple, self.bending);
+            return PointLaw { shear, dilation, coupling, couple, bending };
         }
         let shear = shifted(&self.shear.inverse(), -self.around);
         PointLaw {
@@ -93,6 +97,7 @@ impl Mixture {
             },
             coupling: self.coupling * shear.mean(),
             couple: self.couple,
+            bending: self.bending,
         }
     }
 }

@@ -23,7 +23,7 @@ pub mod rates;
 use cosserat::Cosserat;
 use director::Orientation;
 use flow_curve::FlowCurve;
-use point::PointLaw;
+use point::{PointLaw, Sym2};
 use rates::Rates;
 
 /// Variables on which the law of a material depends. The solver evaluates the law again where one
@@ -124,6 +124,7 @@ impl Softening {
     /// The derivative without the stresses of the rotation.
     pub fn of_shear(mut self) -> Self {
         (self.unit.coupling, self.unit.couple) = (0.0, 0.0);
+        self.unit.bending = Sym2::default();
         self
     }
 
@@ -137,6 +138,7 @@ impl Law {
     /// Whether the material is layered and has directors.
     pub fn is_layered(&self) -> bool {
         matches!(self.shear, Shear::Layered { .. })
+            || self.rotation.is_some_and(|r| r.bending() != 0.0)
     }
 
     /// Variables on which the law depends.
@@ -193,8 +195,10 @@ impl Law {
                 layered::shear(viscosity, layer_viscosity, orientation)
             }
         };
-        let Cosserat { coupling, couple } = self.rotation.unwrap_or_default();
+        let rotation = self.rotation.unwrap_or_default();
+        let Cosserat { coupling, couple, .. } = rotation;
+        let bending = layered::bending(rotation.bending(), orientation);
         let dilation = if self.compliance == 0.0 { viscosity } else { 0.0 };
-        PointLaw { shear, dilation, coupling, couple }
+        PointLaw { shear, dilation, coupling, couple, bending }
     }
 }

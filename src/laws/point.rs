@@ -4,15 +4,16 @@
 //! At given rates and pressure every material has the power per volume
 //!
 //! ```text
-//! d.S d + beta tr(D)^2 + 4 eta_c (omega - w)^2 + M |grad w|^2,   d = (D_xx - D_yy, 2 D_xy)
+//! d.S d + beta tr(D)^2 + 4 eta_c (omega - w)^2 + grad w.(M I + N) grad w,   d = (D_xx - D_yy, 2 D_xy)
 //! ```
-//! plus `-p div u`. An isotropic fluid has `S = eta I`. With `beta = eta` the first two terms are
+//! plus `-p div u`. An isotropic fluid has `S = eta I` and `N = 0`. With `beta = eta` the first two terms are
 //! `2 eta D:D`, the form used for incompressible materials. A material with a finite bulk viscosity
 //! has `beta = 0`; its bulk viscosity enters through the pressure.
 
 use super::rates::{Rates, Stress};
 
-/// Symmetric 2x2 matrix `[[a, c], [c, b]]` on the deviatoric rates, Pa s.
+/// Symmetric 2x2 matrix `[[a, c], [c, b]]` on the deviatoric rates (Pa s) or the curvature rates
+/// (Pa s m2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sym2 {
     /// First diagonal entry.
@@ -47,7 +48,14 @@ impl Sym2 {
         0.5 * (self.a + self.b)
     }
 
+    /// Product with a vector, `S d`.
+    #[inline(always)]
+    pub fn times(&self, d: [f64; 2]) -> [f64; 2] {
+        [self.a * d[0] + self.c * d[1], self.c * d[0] + self.b * d[1]]
+    }
+
     /// Quadratic form `d.S d`.
+    #[inline(always)]
     pub fn quadratic(&self, d: [f64; 2]) -> f64 {
         self.a * d[0] * d[0] + self.b * d[1] * d[1] + 2.0 * self.c * d[0] * d[1]
     }
@@ -64,6 +72,9 @@ pub struct PointLaw {
     pub coupling: f64,
     /// Couple viscosity M, Pa s m2.
     pub couple: f64,
+    /// Couple viscosity matrix N of the bending of layers, Pa s m2; see
+    /// [`layered`](super::layered). `M I + N` is positive semi-definite.
+    pub bending: Sym2,
 }
 
 impl PointLaw {
@@ -78,7 +89,9 @@ impl PointLaw {
     /// The law with all its viscosities multiplied by `f`.
     pub fn scaled(&self, f: f64) -> Self {
         let [coupling, couple] = [self.coupling, self.couple].map(|v| f * v);
-        PointLaw { coupling, couple, ..self.with_viscosity_scaled(f) }
+        let mut bending = Sym2::default();
+        bending.add_scaled(f, &self.bending);
+        PointLaw { coupling, couple, bending, ..self.with_viscosity_scaled(f) }
     }
 
     /// Coupling viscosity minus the mean shear viscosity, Pa s; zero if this is negative.
@@ -93,15 +106,16 @@ impl PointLaw {
 
     /// Viscosity, Pa s, that rotation adds to a flow that varies over the length `h`, m: the
     /// coupling viscosity if the rotation is too stiff to follow the flow, `M/h^2` if it follows
-    /// it.
+    /// it, with the larger couple viscosity of a layered material.
     pub fn turning_viscosity(&self, h: f64) -> f64 {
-        let follow = self.couple / (h * h);
+        let follow = (self.couple + (self.bending.a + self.bending.b).max(0.0)) / (h * h);
         if follow > 0.0 { self.coupling * follow / (self.coupling + follow) } else { 0.0 }
     }
 
     /// Stresses at the rates `r`, multiplied by the volume of the point.
     #[inline(always)]
     pub fn stress(&self, r: &Rates, volume: f64) -> Stress {
+        let bending = self.bending.times(r.kappa);
         Stress {
             deviator: [
                 volume * (self.shear.a * r.d[0] + self.shear.c * r.d[1]),
@@ -109,7 +123,7 @@ impl PointLaw {
             ],
             mean: volume * self.dilation * r.trace,
             skew: volume * 4.0 * self.coupling * r.relative_spin,
-            couple: r.kappa.map(|k| volume * self.couple * k),
+            couple: [0, 1].map(|c| volume * self.couple * r.kappa[c] + volume * bending[c]),
         }
     }
 
@@ -120,5 +134,6 @@ impl PointLaw {
             + self.dilation * r.trace * r.trace
             + 4.0 * self.coupling * r.relative_spin * r.relative_spin
             + self.couple * (r.kappa[0] * r.kappa[0] + r.kappa[1] * r.kappa[1])
+            + self.bending.quadratic(r.kappa)
     }
 }

@@ -271,6 +271,17 @@ pub struct Material {
         "examples" = [0.02]
     ))]
     pub internal_length: Option<Quantity>,
+    /// Internal length R_l of the bending of layers, for a layered material with an internal length
+    /// R, which may be zero: the couple stress is 2 eta_c (R^2 1 + (R_l^2 - R^2) t t) grad w, t the unit
+    /// vector along the layers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "≥ 0",
+        "x-default" = "`internal_length`",
+        "examples" = [0.05]
+    ))]
+    pub layer_internal_length: Option<Quantity>,
     /// Couple viscosity M, instead of an internal length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(

@@ -73,7 +73,7 @@ impl Quadrature {
             if self.composition.fraction(cell, m) > 0.0 {
                 let law = PointLaw {
                     coupling: HOLD * rotation.coupling,
-                    couple: HOLD * rotation.couple,
+                    couple: HOLD * rotation.couple.max(rotation.layer_couple),
                     ..PointLaw::default()
                 };
                 self.points.extend(GAUSS_3X3.iter().map(|g| IntegrationPoint {

@@ -62,6 +62,19 @@ const FAULTS: &[Fault] = &[
         "nan",
         &["materials.sand.shear_viscosity", "NaN is not finite", "a finite number"],
     ),
+    (
+        "shear_viscosity = 100",
+        "shear_viscosity = 100\ncoupling_viscosity = 5\ninternal_length = 0.1\n\
+         layer_internal_length = 0.33",
+        "0.33",
+        &["material `sand` has layer_internal_length but no layers", "give layer_viscosity"],
+    ),
+    (
+        "shear_viscosity = 100",
+        "shear_viscosity = 100\nlayer_viscosity = 50\nlayer_internal_length = 0.33",
+        "0.33",
+        &["material `sand` has layer_internal_length but no internal_length", "it may be 0"],
+    ),
     ("density = 1", "density = -1", "-1\n", &["`sand`: density is -1", "zero or more"]),
     (
         "shear_viscosity = 100",

@@ -207,7 +207,7 @@ fn drop(turned: bool) -> Box<dyn Run> {
             "schema = 1\nname = \"drop\"\ngravity = {gravity}\n[domain]\nx = {domain_x}\ny = {domain_y}\n\
              length_scale = 1\n[accuracy]\ncells = 8\n[time]\nend = 0.4\nmax_step = 0.02\n\
              [materials.drop]\ndensity = 100\nshear_viscosity = 50\ncoupling_viscosity = 40\n\
-             internal_length = 0.2\nlayer_viscosity = 5\n\
+             internal_length = 0.2\nlayer_viscosity = 5\nlayer_internal_length = 0.35\n\
              [materials.rest]\nshear_viscosity = 1\nbackground = true\n\
              [[regions]]\nmaterial = \"drop\"\nshape.circle = {{ centre = {centre}, radius = 0.26 }}\n\
              director.angle_degrees = {angle}\n[[walls]]\nname = \"shelf\"\n{wall}\n"
@@ -234,6 +234,55 @@ fn a_rotated_scene_gives_the_rotated_result() {
         a.step().unwrap();
         b.step().unwrap();
     }
+}
+
+/// Sheared layers with random directors, periodic in x.
+fn bending(r: f64, r_l: f64, more: &str) -> Box<dyn Run> {
+    scene(
+        &format!(
+            "schema = 1\nname = \"bending\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\ncells = 8\n\
+             [time]\nend = 0.4\nmax_step = 0.05\n[materials.layers]\nshear_viscosity = 1\n\
+             layer_viscosity = 1\ncoupling_viscosity = 2\ninternal_length = {r:?}\n\
+             layer_internal_length = {r_l:?}\n[[regions]]\nmaterial = \"layers\"\n\
+             director = \"random\"\n[boundaries]\nleft.kind = \"periodic\"\nright.kind = \"periodic\"\n\
+             bottom = {{ kind = \"no_slip\", rotation = 0 }}\n\
+             top = {{ velocity_x = 1, velocity_y = 0, rotation = 0 }}\n{more}"
+        ),
+        &[],
+    )
+}
+
+#[test]
+fn layers_that_only_bend_flow_and_turn() {
+    // Random directors: the curvature has no resistance in one direction of every point.
+    let mut run = bending(0.0, 0.3, "");
+    let alignment = run.row().mean_alignment.unwrap();
+    finish(run.as_mut(), |run| assert!(run.row().power_error < 1e-6, "{}", run.row().power_error));
+    assert!(
+        run.row().mean_alignment.unwrap() < alignment,
+        "{} {alignment}",
+        run.row().mean_alignment.unwrap()
+    );
+    // A bending length resists the rotation that the walls prevent.
+    let dissipation = |r, r_l| bending(r, r_l, "").row().dissipation;
+    let (none, along, both) =
+        (dissipation(0.0, 1e-3), dissipation(0.0, 0.3), dissipation(0.3, 0.3));
+    assert!(none < along && along < both, "{none} {along} {both}");
+}
+
+#[test]
+fn the_bending_length_can_be_scheduled() {
+    let change =
+        "[[schedule]]\nstep = 1\nset = { \"materials.layers.layer_internal_length\" = 0.5 }\n";
+    let [mut plain, mut changed] = ["", change].map(|more| bending(0.1, 0.2, more));
+    assert_eq!(plain.row().dissipation, changed.row().dissipation);
+    for run in [&mut plain, &mut changed] {
+        run.step().unwrap();
+        run.step().unwrap();
+    }
+    let direct = bending(0.1, 0.5, "").row().dissipation;
+    let (before, after) = (plain.row().dissipation, changed.row().dissipation);
+    assert!((after / direct - 1.0).abs() < 0.5 * (before / direct - 1.0).abs(), "{before} {after}");
 }
 
 #[test]

@@ -39,6 +39,11 @@ fn an_effect_switched_off_changes_nothing() {
         ("rotation: no coupling", "coupling_viscosity = 0, internal_length = 0.1"),
         ("rotation: no couple viscosity", "coupling_viscosity = 5, couple_viscosity = 0"),
         ("directors: layer viscosity equal to the viscosity", "layer_viscosity = 2"),
+        (
+            "bending: both internal lengths zero",
+            "coupling_viscosity = 5, internal_length = 0, layer_viscosity = 2, \
+             layer_internal_length = 0",
+        ),
     ] {
         let fluid = format!("materials.fluid = {{ shear_viscosity = 2, density = 3, {more} }}");
         assert_eq!(bits(lid(&fluid)), plain, "{effect}");

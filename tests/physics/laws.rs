@@ -1,7 +1,7 @@
 //! A conformance suite for the laws that assembly calls: symmetric, positive, frame-indifferent, equal
 //! to the source's equations, right in the limits.
 
-use grainscope::laws::cosserat::Cosserat;
+use grainscope::laws::cosserat::{Cosserat, couple_viscosity};
 use grainscope::laws::director::{self, Orientation};
 use grainscope::laws::flow_curve::{FlowCurve, Friction, Strength};
 use grainscope::laws::mixture::Mixture;
@@ -18,6 +18,13 @@ fn unit(angle: f64) -> Vector2<f64> {
     Vector2::new(angle.cos(), angle.sin())
 }
 
+/// No rotation, one with a single internal length, and those of layers with a length of their own: a
+/// larger one, a smaller one, and one without the other.
+fn rotations() -> [Option<Cosserat>; 5] {
+    let length = |couple, layer_couple| Some(Cosserat { coupling: 300.0, couple, layer_couple });
+    [None, length(12.0, 12.0), length(12.0, 70.0), length(12.0, 0.0), length(0.0, 12.0)]
+}
+
 /// Every kind of law, classical and Cosserat, incompressible and not.
 fn laws() -> Vec<Law> {
     let mut list = Vec::new();
@@ -26,7 +33,7 @@ fn laws() -> Vec<Law> {
         Shear::Layered { layer_viscosity: 1.0 },
         Shear::Layered { layer_viscosity: 3.0 * ETA },
     ] {
-        for rotation in [None, Some(Cosserat { coupling: 300.0, couple: 12.0 })] {
+        for rotation in rotations() {
             for compliance in [0.0, 1e-4] {
                 list.push(Law { shear, rotation, compliance, curve: None });
             }
@@ -138,7 +145,7 @@ fn stresses_are_those_of_the_source() {
         expected += Matrix2::new(0.0, -skew, skew, 0.0);
         let law = Law {
             shear: Shear::Layered { layer_viscosity: eta_s },
-            rotation: Some(Cosserat { coupling, couple }),
+            rotation: Some(Cosserat::isotropic(coupling, couple)),
             compliance: 0.0,
             curve: None,
         };
@@ -173,6 +180,58 @@ fn laws_have_their_limits() {
     // A classical fluid feels no rotation.
     let classical = at(&Law::default(), 0.0).stress(&rates_of(&Vector6::from(SOME)), 1.0);
     assert_eq!((classical.skew, classical.couple), (0.0, [0.0; 2]));
+}
+
+#[test]
+fn layers_bend_with_their_own_length() {
+    // mu = 2 eta_c (R^2 1 + (R_l^2 - R^2) t t^T) grad w, also as a mean over directors.
+    let (coupling, r, r_l) = (300.0, 0.2, 0.7);
+    let law = |layer_viscosity| Law {
+        shear: Shear::Layered { layer_viscosity },
+        rotation: Some(Cosserat {
+            coupling,
+            couple: couple_viscosity(coupling, r),
+            layer_couple: couple_viscosity(coupling, r_l),
+        }),
+        ..Law::default()
+    };
+    let kappa = Vector2::new(0.5, -0.8);
+    let rates = Rates { kappa: [kappa.x, kappa.y], ..Rates::default() };
+    let mut orientation = Orientation::default();
+    let mut matrix = Matrix2::identity() * (2.0 * coupling * r * r);
+    for (k, angle) in ANGLES.into_iter().enumerate() {
+        let t = Vector2::new(-angle.sin(), angle.cos());
+        let weight = 1.0 + k as f64;
+        orientation.add(weight, [angle.cos(), angle.sin()]);
+        matrix += t * t.transpose() * (2.0 * coupling * (r_l * r_l - r * r) * weight / 28.0);
+        let single = law(50.0).at(&Here::without_flow(ETA, &Orientation::of([-t.y, t.x])));
+        let along = single.stress(&Rates { kappa: [t.x, t.y], ..Rates::default() }, 1.0).couple;
+        let across = single.stress(&Rates { kappa: [-t.y, t.x], ..Rates::default() }, 1.0).couple;
+        assert!((Vector2::from(along) - 2.0 * coupling * r_l * r_l * t).norm() < 1e-9);
+        let n = Vector2::new(-t.y, t.x);
+        assert!((Vector2::from(across) - 2.0 * coupling * r * r * n).norm() < 1e-9);
+    }
+    // Layers that only bend have the viscosity of an isotropic fluid.
+    for layer_viscosity in [50.0, ETA] {
+        let found = law(layer_viscosity).at(&Here::without_flow(ETA, &orientation));
+        let couple = Vector2::from(found.stress(&rates, 1.0).couple);
+        assert!((couple - matrix * kappa).norm() < 1e-9, "{couple} {}", matrix * kappa);
+        assert!((found.power(&rates) - kappa.dot(&(matrix * kappa))).abs() < 1e-9);
+    }
+    // Materials that share a cell have the mean of their couple stresses.
+    let here = Here::without_flow(ETA, &orientation);
+    let (layers, plain) = (law(50.0).at(&here), Law::default().at(&here));
+    for mut mixture in [Mixture::default(), Mixture::parallel(), Mixture::around_drops(3.0)] {
+        mixture.add(0.3, &layers);
+        mixture.add(0.7, &plain);
+        let couple = Vector2::from(mixture.law().stress(&rates, 1.0).couple);
+        assert!((couple - 0.3 * matrix * kappa).norm() < 1e-9);
+    }
+    // With a flow curve, the square of the rate has the power of the bending.
+    let strength = Strength::HerschelBulkley { yield_stress: 1.0, consistency: 1.0, index: 1.0 };
+    let curve = Some(FlowCurve { strength, smallest: 1e-6, largest: 1e6 });
+    let g = Law { curve, ..law(0.1) }.rate(&rates, &orientation);
+    assert!((g * g - kappa.dot(&(matrix * kappa))).abs() < 1e-9);
 }
 
 #[test]
@@ -254,6 +313,7 @@ fn mixtures_are_exact_for_one_law_and_between_the_bounds_for_two() {
         dilation: eta,
         coupling: eta,
         couple: 0.1 * eta,
+        ..PointLaw::default()
     };
     for (eta, other) in [(1.0, 1e8), (1e8, 1.0), (3.0, 3.0)] {
         for phi in [0.0, 1e-9, 0.3, 0.5, 1.0] {
@@ -281,11 +341,12 @@ fn generalised() -> Vec<Law> {
     };
     let mud = Strength::HerschelBulkley { yield_stress: 2.0, consistency: 3.0, index: 0.6 };
     // A larger coupling than the mean shear viscosity is integrated otherwise.
-    let rotation = Some(Cosserat { coupling: 0.5, couple: 0.3 });
+    let rotation = Some(Cosserat::isotropic(0.5, 0.3));
+    let bending = Some(Cosserat { coupling: 0.5, couple: 0.3, layer_couple: 2.0 });
     let mut list = Vec::new();
     for strength in [mud, Strength::Friction(friction)] {
         for shear in [Shear::Newtonian, Shear::Layered { layer_viscosity: 0.2 }] {
-            for rotation in [None, rotation] {
+            for rotation in [None, rotation, bending] {
                 let curve = Some(FlowCurve { strength, smallest: 1e-6, largest: 1e6 });
                 list.push(Law { shear, rotation, compliance: 0.0, curve });
             }
@@ -370,8 +431,9 @@ fn a_flow_curve_without_yield_is_the_linear_law() {
     let strength = Strength::HerschelBulkley { yield_stress: 0.0, consistency: ETA, index: 1.0 };
     let curve = Some(FlowCurve { strength, smallest: 1e-9 * ETA, largest: 1e9 * ETA });
     let (coupling, couple) = (0.7, 0.3);
-    let relative = Law { rotation: Some(Cosserat { coupling, couple }), curve, ..Law::default() };
-    let rotation = Some(Cosserat { coupling: ETA * coupling, couple: ETA * couple });
+    let relative =
+        Law { rotation: Some(Cosserat::isotropic(coupling, couple)), curve, ..Law::default() };
+    let rotation = Some(Cosserat::isotropic(ETA * coupling, ETA * couple));
     let linear = Law { rotation, ..Law::default() };
     let orientation = Orientation::default();
     let r = Vector6::from(SOME);

@@ -31,7 +31,7 @@ pub(super) struct Generalised {
     pub(super) nominal: f64,
     /// Coupling viscosity over shear viscosity.
     pub(super) coupling_ratio: f64,
-    /// Viscosity of shear along the layers over shear viscosity, if the material is layered.
+    /// Viscosity of shear along the layers over shear viscosity, if it is given.
     pub(super) layer_ratio: Option<f64>,
 }
 
@@ -130,7 +130,7 @@ pub(super) fn generalised(
         curve: FlowCurve { strength, smallest, largest },
         nominal: nominal.clamp(smallest, largest),
         coupling_ratio,
-        layer_ratio: m.layer_ratio.as_ref().map(ratio).transpose()?.filter(|&r| r != 1.0),
+        layer_ratio: m.layer_ratio.as_ref().map(ratio).transpose()?,
     }))
 }
 

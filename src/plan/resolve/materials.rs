@@ -1,8 +1,9 @@
 //! This module resolves the `[materials]` tables and gravity into checked values in SI units.
 
 use super::flow_curves::{self, Generalised, Surroundings, generalised};
+use super::rotation::rotation;
 use super::values::{Result, finite_range, not_negative, positive, ranges};
-use crate::laws::cosserat::{self, Cosserat};
+use crate::laws::cosserat::Cosserat;
 use crate::laws::flow_curve::FlowCurve;
 use crate::laws::{Law, Shear, granular};
 use crate::plan::material::Material;
@@ -105,6 +106,7 @@ impl SiMatter {
                         rotation: m.rotation.map(|r| Cosserat {
                             coupling: r.coupling / viscosity,
                             couple: r.couple / (viscosity * u.length * u.length),
+                            layer_couple: r.layer_couple / (viscosity * u.length * u.length),
                         }),
                         compliance: m.compliance * u.viscosity,
                         curve: m.curve.map(|c| flow_curves::scaled(&c, u)),
@@ -207,28 +209,8 @@ impl SiMaterial {
             (None, Some(c)) => c.coupling,
             (None, None) => 0.0,
         };
-        let couple = match (&m.internal_length, &m.couple_viscosity) {
-            (Some(r), None) => {
-                cosserat::couple_viscosity(coupling, not_negative(r, scope, "internal_length")?)
-            }
-            (None, Some(q)) => not_negative(q, scope, "couple_viscosity")?,
-            (None, None) => 0.0,
-            (Some(q), Some(_)) => {
-                return Err(SceneError::at(
-                    q,
-                    format!("material `{name}` has both internal_length and couple_viscosity"),
-                    "give one of them: couple_viscosity = 2 coupling_viscosity internal_length^2",
-                ));
-            }
-        };
-        let rotation = (coupling > 0.0 && couple > 0.0).then_some(Cosserat { coupling, couple });
-        let length_alone = coupling == 0.0
-            && m.internal_length.is_some()
-            && m.coupling_viscosity.is_none()
-            && m.coupling_ratio.is_none();
-        if length_alone || coupling > 0.0 && couple == 0.0 && m.internal_length.is_none() {
-            warnings.push(Warning::NoInternalLength { material: name.into() });
-        }
+        let rotation = rotation((name, m), scope, coupling, warnings)?;
+        let bends = rotation.is_some_and(|r| r.bending() != 0.0);
         let bulk = match (&m.bulk_viscosity, contacts, &m.granular) {
             (Some(q), ..) => Some(positive(q, scope, "bulk_viscosity")?),
             (None, Some(c), Some(g)) if !g.incompressible => Some(c.bulk),
@@ -239,8 +221,9 @@ impl SiMaterial {
             .as_ref()
             .map(|q| positive(q, scope, "layer_viscosity"))
             .transpose()?
-            .filter(|&eta_s| shear.constant() != Some(eta_s));
-        let layer = curve.as_ref().map_or(layer, |g| g.layer_ratio);
+            .filter(|&eta_s| bends || shear.constant() != Some(eta_s));
+        let layer_ratio = |g: &Generalised| g.layer_ratio.filter(|&r| bends || r != 1.0);
+        let layer = curve.as_ref().map_or(layer, layer_ratio);
         if let Some(eta_s) = layer
             && eta_s > if curve.is_some() { 1.0 } else { range[0] }
         {

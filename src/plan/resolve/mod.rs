@@ -11,6 +11,7 @@ mod null_spaces;
 mod pressure;
 mod recording;
 mod regions;
+mod rotation;
 mod scales;
 mod schedule;
 mod sides;

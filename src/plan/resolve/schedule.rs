@@ -165,6 +165,7 @@ fn set_material(m: &mut scene::Material, field: &str, value: &Quantity) -> bool 
         "bulk_viscosity" => m.bulk_viscosity = Some(value.clone()),
         "coupling_viscosity" => m.coupling_viscosity = Some(value.clone()),
         "internal_length" => m.internal_length = Some(value.clone()),
+        "layer_internal_length" => m.layer_internal_length = Some(value.clone()),
         "couple_viscosity" => m.couple_viscosity = Some(value.clone()),
         "layer_viscosity" => m.layer_viscosity = Some(value.clone()),
         "coupling_ratio" => m.coupling_ratio = Some(value.clone()),

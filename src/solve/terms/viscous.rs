@@ -4,7 +4,7 @@
 //! Per volume, with `d = (D_xx - D_yy, 2 D_xy)` and the spin `o = (v,x - u,y)/2`,
 //!
 //! ```text
-//! d.S d~ + beta tr(D) tr(D~) + 4 eta_c (o - w)(o~ - w~) + M grad w . grad w~
+//! d.S d~ + beta tr(D) tr(D~) + 4 eta_c (o - w)(o~ - w~) + grad w.(M I + N) grad w~
 //! ```
 //! The coupling viscosity is integrated point by point only up to the shear viscosity;
 //! [`rotation`](super::rotation) adds the excess. The forces of cells with the points of the Gauss
@@ -179,36 +179,32 @@ struct Together<const D: usize> {
     strain: Lanes,
 }
 
-/// One [`PointLaw`] for each cell.
+/// One [`PointLaw`] for each cell: its nine coefficients in the order of its fields.
 #[derive(Clone, Copy)]
-struct LawLanes {
-    shear: [Lanes; 3],
-    dilation: Lanes,
-    coupling: Lanes,
-    couple: Lanes,
-}
+struct LawLanes([Lanes; 9]);
 
 const ZERO: Lanes = [0.0; TOGETHER];
 
 impl LawLanes {
-    const ZERO: Self = LawLanes { shear: [ZERO; 3], dilation: ZERO, coupling: ZERO, couple: ZERO };
-
     #[inline(always)]
     fn set(&mut self, k: usize, law: &PointLaw) {
-        let Sym2 { a, b, c } = law.shear;
-        (self.shear[0][k], self.shear[1][k], self.shear[2][k]) = (a, b, c);
-        self.dilation[k] = law.dilation;
-        self.coupling[k] = law.coupling;
-        self.couple[k] = law.couple;
+        let (s, b) = (law.shear, law.bending);
+        let rest = [law.dilation, law.coupling, law.couple];
+        for (c, v) in [s.a, s.b, s.c].into_iter().chain(rest).chain([b.a, b.b, b.c]).enumerate() {
+            self.0[c][k] = v;
+        }
     }
 
+    /// The law of lane `k`; without rotation, bending is left out.
     #[inline(always)]
-    fn get(&self, k: usize) -> PointLaw {
+    fn get<const D: usize>(&self, k: usize) -> PointLaw {
+        let v = |c: usize| if D == 3 || c < 6 { self.0[c][k] } else { 0.0 };
         PointLaw {
-            shear: Sym2 { a: self.shear[0][k], b: self.shear[1][k], c: self.shear[2][k] },
-            dilation: self.dilation[k],
-            coupling: self.coupling[k],
-            couple: self.couple[k],
+            shear: Sym2 { a: v(0), b: v(1), c: v(2) },
+            dilation: v(3),
+            coupling: v(4),
+            couple: v(5),
+            bending: Sym2 { a: v(6), b: v(7), c: v(8) },
         }
     }
 }
@@ -217,7 +213,7 @@ impl<const D: usize> Together<D> {
     /// Lanes without a cell have no stiffness.
     const EMPTY: Self = Together {
         nodal: [[ZERO; NODES]; D],
-        laws: [LawLanes::ZERO; 9],
+        laws: [LawLanes([ZERO; 9]); 9],
         per_length: [ZERO; 2],
         volume: ZERO,
         dissipation: ZERO,
@@ -276,7 +272,7 @@ fn stresses_kernel<const LENGTH: usize, const FMA: bool, const D: usize>(cells: 
                 gradient.x[c] = x[c][g][k] * px[k];
                 gradient.y[c] = y[c][g][k] * py[k];
             }
-            let (rates, law) = (gradient.rates(), cells.laws[g].get(k));
+            let (rates, law) = (gradient.rates(), cells.laws[g].get::<D>(k));
             let volume = weight * cells.volume[k];
             cells.dissipation[k] += volume * law.power(&rates);
             cells.strain[k] += volume * rates.strain_squared();
@@ -413,6 +409,7 @@ mod tests {
                 dilation: 1.5 + 0.2 * t,
                 coupling: 0.8 + 0.05 * t,
                 couple: 0.3 + 0.02 * t,
+                bending: Sym2 { a: 0.2 + 0.01 * t, b: 0.1, c: -0.05 + 0.01 * t },
             };
             let GaussPoint { weight, r, .. } = GAUSS_3X3[g];
             IntegrationPoint { law, density: 1.0, weight, r }
