@@ -2,7 +2,10 @@
 //! in any version.
 
 pub use crate::cases::rayleigh_taylor::{Undulation, growth_ratio};
-pub use crate::cases::{Case, Fluid, couette, coupled_cell, poiseuille};
+pub use crate::cases::{
+    Case, CoupleWave, Fluid, Layered, couette, couple_wave, coupled_cell, layered_channel,
+    poiseuille,
+};
 pub use crate::cost::effects::{Pair, pair, without};
 pub use crate::cost::knobs::KNOBS;
 pub use crate::motion::frozen_flow::{CellVelocities, FrozenFlow};

@@ -22,7 +22,7 @@ impl Fluid {
         (4.0 * self.shear * self.coupling / (m * (self.shear + self.coupling))).sqrt()
     }
 
-    fn toml(&self) -> String {
+    pub(super) fn toml(&self) -> String {
         format!(
             "[materials.fluid]\nshear_viscosity = {:?}\ncoupling_viscosity = {:?}\n\
              internal_length = {:?}\n[[regions]]\nmaterial = \"fluid\"\n",

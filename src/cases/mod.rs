@@ -1,6 +1,7 @@
 //! This module holds cases with exact solutions. A case combines a scene, its exact fields and the
 //! expected orders of convergence. Tests and commands measure all cases with the same functions.
 
+mod bending;
 mod cosserat;
 mod flow_curves;
 mod inclined;
@@ -16,6 +17,7 @@ mod solkz;
 mod solvi;
 mod vortex;
 
+pub use bending::{CoupleWave, Layered, couple_wave, layered_channel};
 pub use cosserat::{Fluid, couette, coupled_cell, poiseuille};
 pub use flow_curves::{Channel, Unidirectional, bagnold, channel, chute};
 pub use inclined::{Inclined, inclined_pure_shear, inclined_shear};
