@@ -132,7 +132,7 @@ enum Command {
     Film(film::Args),
     /// Run a scene for many values of its parameters, here or on a cluster
     Sweep(sweep::Args),
-    /// Make a figure of the source paper: runs, plots, snapshots, a recording side by side
+    /// Make a figure of the source paper or of grains: runs, plots, snapshots, recordings
     Figure(figure::Args),
     /// Close the recording or the files of a run that was killed
     Repair(repair::Args),

@@ -208,6 +208,44 @@ fn a_truncated_recording_is_compared_up_to_its_end() {
 }
 
 #[test]
+fn figures_of_grains_are_made_by_one_command() {
+    let here = TempFolder::new();
+    let made = |name: &str, files: &[&str]| {
+        let said = here.grainscope(&["figure", name, "--quick", "--out", name]).exits(0);
+        for file in files {
+            assert!(here.has(&format!("{name}/{file}")), "{file}");
+        }
+        said.out
+    };
+    // The number behind the last occurrence of a text.
+    let number = |text: &str, before: &str| -> f64 {
+        let rest = &text[text.rfind(before).unwrap_or_else(|| panic!("{before}: {text}"))..];
+        let rest = rest[before.len()..].trim_start();
+        let end = rest.find(|c: char| !"+-.e".contains(c) && !c.is_ascii_digit());
+        rest[..end.unwrap_or(rest.len())].parse().unwrap_or_else(|e| panic!("{e}: {text}"))
+    };
+    // Grains leave at a constant rate, a fluid does not.
+    let said = made("hourglass", &["hourglass_discharge.svg", "clepsydra/summary.json"]);
+    let [grains, water] = ["grains: ", "water: "].map(|name| {
+        let line = said.lines().find(|line| line.starts_with(name));
+        number(line.unwrap_or_else(|| panic!("{said}")), "ratio ")
+    });
+    assert!((grains - 1.0).abs() < 0.06 && water < 0.92, "{said}");
+    let said = made("beverloo", &["beverloo_rates.png", "aperture_0.9/summary.json"]);
+    assert!((number(&said, "plain exponent ") - 1.5).abs() < 0.1, "{said}");
+    assert!(number(&said, "W0 is ").abs() < 2.0, "{said}");
+    // The width of a band depends on the mesh unless the grains have an internal length.
+    let said = made("bands", &["bands_width.svg", "bands_width.png", "bands.toml"]);
+    let change =
+        |r: &str| number(&said, &format!("R = {r} m: from 16 to 32 cells the width changes by "));
+    assert!(change("0.0625").abs() < 3.0 && change("0") < -20.0, "{said}");
+    here.write("bands/bands.toml", "schema = 1");
+    here.grainscope(&["figure", "bands", "--quick", "--out", "bands"])
+        .exits(1)
+        .complains(&["--force"]);
+}
+
+#[test]
 fn figures_are_made_by_one_command() {
     let here = TempFolder::new();
     here.grainscope(&["figure", "alignment", "--quick", "--out", "fig"]).exits(0);
