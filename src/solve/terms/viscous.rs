@@ -189,10 +189,8 @@ impl LawLanes {
     #[inline(always)]
     fn set(&mut self, k: usize, law: &PointLaw) {
         let (s, b) = (law.shear, law.bending);
-        let rest = [law.dilation, law.coupling, law.couple];
-        for (c, v) in [s.a, s.b, s.c].into_iter().chain(rest).chain([b.a, b.b, b.c]).enumerate() {
-            self.0[c][k] = v;
-        }
+        let list = [s.a, s.b, s.c, law.dilation, law.coupling, law.couple, b.a, b.b, b.c];
+        self.0.iter_mut().zip(list).for_each(|(lane, v)| lane[k] = v);
     }
 
     /// The law of lane `k`; without rotation, bending is left out.
