@@ -50,6 +50,35 @@ bottom.kind = "no_slip"
 top.kind = "open"
 "#;
 
+/// The flow down an incline is steady, so it needs no step; its discharge is that of Bagnold's profile.
+#[test]
+fn a_steady_flow_takes_no_step() {
+    let here = TempFolder::new();
+    let sets = ["--set", "time.steady=true"];
+    here.grainscope(&[&["run", "incline", "--out", "r", "--json"], &sets[..]].concat()).exits(0);
+    let summary = here.read("r/summary.json");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("a summary");
+    assert_eq!(summary["steps"], 0);
+    let rate = summary["gauges"]["discharge"]["rate"].as_f64().expect("a rate");
+    assert!((rate / 0.691765 - 1.0).abs() < 0.005, "{rate}");
+    let plan = here.grainscope(&[&["plan", "incline"], &sets[..]].concat()).exits(0);
+    assert!(!plan.out.contains("advection"), "{}", plan.out);
+}
+
+#[test]
+fn times_are_needed_unless_the_flow_is_steady() {
+    let here = TempFolder::new();
+    let column = COLUMN.replace("end = 0.5", "steady = true");
+    here.write("inertia.toml", &column);
+    let refused = here.grainscope(&["check", "inertia.toml"]).exits(3);
+    assert!(refused.err.contains("steady") && refused.err.contains("inertia"));
+    here.write("still.toml", column.replace("inertia = true\n", ""));
+    here.grainscope(&["check", "still.toml"]).exits(0);
+    here.write("endless.toml", COLUMN.replace("end = 0.5", ""));
+    let refused = here.grainscope(&["check", "endless.toml"]).exits(3);
+    assert!(refused.err.contains("time.end is missing"), "{}", refused.err);
+}
+
 #[test]
 fn fields_of_grains_are_recorded_and_exported() {
     let here = TempFolder::new();
