@@ -390,6 +390,8 @@ material = "sand"
             ""
         } else if any(&["friction.", "cohesion"]) {
             "friction = { static = 0.3, grain_diameter = 1e-3 }"
+        } else if any(&["layer_internal_length"]) {
+            "shear_viscosity = 100\nlayer_viscosity = 1\ncoupling_viscosity = 50\ninternal_length = 0"
         } else if any(&["granular."]) {
             "granular = { porosity = 0.5, coordination = 4, normal_dashpot = 1, tangential_dashpot = 1 }"
         } else if any(&["yield_stress", "flow_index", "_ratio", "largest_", "smallest_"]) {
