@@ -5,49 +5,26 @@ use super::cells::CellMut;
 use super::form::Form;
 use super::laminate::{self, Cut};
 use super::last_flow::LastFlow;
+use super::local_laws::Evaluation;
 use super::points::{CutStiffness, IntegrationPoint, Place};
 use super::sides::{self, Sides};
 use crate::composition::interface::Interface;
 use crate::composition::straight::StraightCut;
-use crate::composition::{Content, Gathered, Kind};
+use crate::composition::{Content, Gathered};
 use crate::laws::director::Orientation;
 use crate::laws::mixture::Mixture;
 use crate::laws::point::PointLaw;
 use crate::laws::{Here, Softening};
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
-use crate::space::constraints::FixedSides;
 use crate::space::kink::Ramp;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
-use crate::space::shape::{GAUSS_6X6, SUBPOINTS};
+use crate::space::shape::GAUSS_6X6;
 
 /// Law of a material whose particles are all alike.
 pub fn uniform(m: &Material) -> PointLaw {
     m.law.at(&Here::without_flow(m.viscosity, &Orientation::default()))
-}
-
-/// Inputs of the evaluation of cells.
-#[derive(Clone, Copy)]
-pub struct Evaluation<'a> {
-    /// Rule that determines the integration points.
-    pub rule: Rule,
-    /// The mesh.
-    pub mesh: &'a Mesh,
-    /// Particles, sorted by cell.
-    pub particles: &'a Particles,
-    /// The materials.
-    pub materials: &'a [Material],
-    /// Properties of each material that the composition needs.
-    pub kinds: &'a [Kind],
-    /// Content of each cell.
-    pub content: &'a [Content],
-    /// Factor on each material's volume in cut cells.
-    pub factors: &'a [f64],
-    /// Sides of each cell on which the velocity is prescribed.
-    pub walls: &'a [FixedSides],
-    /// Last iterate, for laws that depend on rates or pressure.
-    pub flow: &'a dyn LastFlow,
 }
 
 impl Evaluation<'_> {
@@ -145,37 +122,6 @@ impl Evaluation<'_> {
         });
     }
 
-    /// State of a material at a point of a cell.
-    fn here<'o>(
-        &self,
-        (cell, r): (usize, [f64; 2]),
-        m: usize,
-        viscosity: f64,
-        orientation: &'o Orientation,
-    ) -> Here<'o> {
-        let mut here = Here::without_flow(viscosity, orientation);
-        if self.materials[m].law.depends_on().needs_flow() {
-            here.flow = self.flow.at(cell, r);
-        }
-        here
-    }
-
-    /// Law of a material at a point of a cell.
-    fn law(
-        &self,
-        point: (usize, [f64; 2]),
-        m: usize,
-        viscosity: f64,
-        orientation: &Orientation,
-    ) -> PointLaw {
-        self.materials[m].law.at(&self.here(point, m, viscosity, orientation))
-    }
-
-    /// Carried or constant viscosity of a material at a point of a gathered cell.
-    fn viscosity(&self, m: usize, r: [f64; 2], scratch: &Gathered) -> f64 {
-        scratch.viscosity_at(m, r).unwrap_or(self.materials[m].viscosity)
-    }
-
     /// Stiffness of a cell of two materials with an interface.
     fn laminate(
         &self,
@@ -229,29 +175,10 @@ impl Evaluation<'_> {
         CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kinked }) }
     }
 
-    /// Law of one material at the centre of the cell.
-    pub(super) fn law_at_centre(&self, cell: usize, m: usize, scratch: &Gathered) -> PointLaw {
-        let eta = self.viscosity(m, [0.0; 2], scratch);
-        self.law((cell, [0.0; 2]), m, eta, scratch.cell_orientation(m))
-    }
-
     /// Mean of the viscosities of the cell's materials, weighted by volume.
     fn arithmetic_viscosity(&self, scratch: &Gathered) -> f64 {
         let total: f64 = scratch.volumes().iter().sum();
         scratch.volumes().iter().zip(self.materials).map(|(v, m)| v / total * m.viscosity).sum()
-    }
-
-    /// Law of one material at the points of [`GAUSS_6X6`].
-    fn law_in_cell(&self, cell: usize, m: usize, scratch: &Gathered) -> [PointLaw; SUBPOINTS] {
-        let orientation = scratch.cell_orientation(m);
-        let material = &self.materials[m];
-        if !material.carries_viscosity && !material.law.depends_on().needs_flow() {
-            return [self.law((cell, [0.0; 2]), m, material.viscosity, orientation); SUBPOINTS];
-        }
-        std::array::from_fn(|q| {
-            let r = GAUSS_6X6[q].r;
-            self.law((cell, r), m, self.viscosity(m, r, scratch), orientation)
-        })
     }
 
     /// Fills the nine points of a cell, its volume fractions and its means. `softened`: the part of

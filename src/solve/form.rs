@@ -1,6 +1,6 @@
 //! This module finds how the materials of a cell are arranged: which rule of mixture it needs.
 
-use super::evaluate::Evaluation;
+use super::local_laws::Evaluation;
 use crate::composition::Gathered;
 use crate::composition::centroids::Centroids;
 use crate::composition::interface::Interface;

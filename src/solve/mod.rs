@@ -9,6 +9,7 @@ pub mod evaluate;
 mod form;
 pub mod laminate;
 pub mod last_flow;
+mod local_laws;
 pub mod matrices;
 pub mod multifrontal;
 pub mod nonlinear;

@@ -22,8 +22,8 @@
 //! to its volume: the method of the source paper, for comparison.
 
 use super::cells::CellsMut;
-use super::evaluate::Evaluation;
 use super::last_flow::LastFlow;
+use super::local_laws::Evaluation;
 use super::points::{CutStiffness, IntegrationPoint};
 use super::sides::Kinked;
 use super::softening::{self, Directions, SofteningPoint};
