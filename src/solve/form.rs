@@ -78,7 +78,7 @@ impl Evaluation<'_> {
     /// Such a side is a rough wall. Grains that advance along it roll over what was there before, since
     /// nothing moves at the wall itself, and the film that remains is thinner than a grain. As a layer
     /// of its own it would let the grains glide: the front of a collapsing column then reaches 5.0
-    /// instead of 4.6 column heights (3.9 in experiments with single grains).
+    /// instead of 4.6 column heights (3.9 in simulations of single grains).
     fn is_film(&self, cell: usize, between: [usize; 2], scratch: &mut Gathered) -> bool {
         let held = self.walls[cell].along;
         let rubs =
