@@ -30,13 +30,16 @@ impl Evaluation<'_> {
     /// Arrangement of the materials in a gathered cell.
     pub(super) fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
         if self.rule == Rule::Sides && self.densities_differ(scratch.volumes()) {
-            let between = present(scratch.volumes());
-            if between.is_some_and(|b| self.is_film(cell, b, scratch)) {
+            let Some(between) = present(scratch.volumes()) else { return Form::Weights };
+            let viscosity = self.materials.iter().map(|m| m.viscosity);
+            let centroids =
+                scratch.centroids((self.mesh, cell), self.particles, self.factors, viscosity);
+            if self.is_film(cell, between, centroids) {
                 return Form::Film;
             }
-            let cut = between.and_then(|b| Some((self.straight_cut(cell, b, scratch)?, b)));
-            return match cut {
-                Some((cut, between)) => Form::Sides { cut, between },
+            let [_, b] = between;
+            return match StraightCut::new(centroids.share(b), centroids.centroid(b)) {
+                Some(cut) => Form::Sides { cut, between },
                 None => Form::Weights,
             };
         }
@@ -79,7 +82,7 @@ impl Evaluation<'_> {
     /// nothing moves at the wall itself, and the film that remains is thinner than a grain. As a layer
     /// of its own it would let the grains glide: the front of a collapsing column then reaches 5.0
     /// instead of 4.6 column heights (3.9 in simulations of single grains).
-    fn is_film(&self, cell: usize, between: [usize; 2], scratch: &mut Gathered) -> bool {
+    fn is_film(&self, cell: usize, between: [usize; 2], centroids: &Centroids) -> bool {
         let held = self.walls[cell].along;
         let rubs =
             |m: usize| self.materials[m].law.curve.as_ref().is_some_and(|c| c.friction().is_some());
@@ -91,30 +94,12 @@ impl Evaluation<'_> {
         if held == [false; 4] {
             return false;
         }
-        let centroids = self.centroids(cell, scratch);
         let [from, to] = [grains, film].map(|m| centroids.centroid(m));
         let way = [to[0] - from[0], to[1] - from[1]];
         // The side that the film lies on, if it lies on one.
         let normal = usize::from(way[0].abs() < way[1].abs());
         let side = 2 * normal + usize::from(way[normal] > 0.0);
         held[side] && centroids.share(film) < 0.5
-    }
-
-    /// Shares and centroids of the materials of a gathered cell.
-    fn centroids<'s>(&self, cell: usize, scratch: &'s mut Gathered) -> &'s Centroids {
-        let viscosity = self.materials.iter().map(|m| m.viscosity);
-        scratch.centroids((self.mesh, cell), self.particles, self.factors, viscosity)
-    }
-
-    /// The straight line between the two materials of a gathered cell.
-    fn straight_cut(
-        &self,
-        cell: usize,
-        [_, b]: [usize; 2],
-        scratch: &mut Gathered,
-    ) -> Option<StraightCut> {
-        let centroids = self.centroids(cell, scratch);
-        StraightCut::new(centroids.share(b), centroids.centroid(b))
     }
 }
 
