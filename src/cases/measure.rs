@@ -144,20 +144,27 @@ impl Errors {
             sums[k][0] += weight * error * error;
             sums[k][1] += weight * exact * exact;
         };
-        for cell in 0..mesh.cells() {
+        let mut at = |cell: usize, r: [f64; 2], weight: f64| {
+            let p = plan.si(mesh.from_reference(cell, r));
+            let weight = weight * mesh.cell_volume(cell);
+            let (u, e) = (run.velocity_at(p), (exact.velocity)(p[0], p[1]));
+            add(0, weight, u[0] - e[0], e[0]);
+            add(0, weight, u[1] - e[1], e[1]);
+            add(1, weight, u[2] - e[2], e[2]);
+            let (q, e) = (run.pressure_at(p), (exact.pressure)(p[0], p[1]));
+            add(2, weight, q - e, e);
+            means[0] += weight;
+            means[1] += weight * (q - e);
+            means[2] += weight * e;
+        };
+        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+            if let Some(part) = mesh.part(cell) {
+                part.points.iter().for_each(|p| at(cell, p.r, p.weight));
+                continue;
+            }
             for (eta, wy) in GAUSS_5 {
                 for (xi, wx) in GAUSS_5 {
-                    let p = plan.si(mesh.from_reference(cell, [xi, eta]));
-                    let weight = wx * wy * mesh.cell_volume(cell);
-                    let (u, e) = (run.velocity_at(p), (exact.velocity)(p[0], p[1]));
-                    add(0, weight, u[0] - e[0], e[0]);
-                    add(0, weight, u[1] - e[1], e[1]);
-                    add(1, weight, u[2] - e[2], e[2]);
-                    let (q, e) = (run.pressure_at(p), (exact.pressure)(p[0], p[1]));
-                    add(2, weight, q - e, e);
-                    means[0] += weight;
-                    means[1] += weight * (q - e);
-                    means[2] += weight * e;
+                    at(cell, [xi, eta], wx * wy);
                 }
             }
         }

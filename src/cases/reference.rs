@@ -71,7 +71,7 @@ fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
     constraints.refer(plan.pressure_reference);
     let mut stokes = Stokes::new(mesh.clone(), constraints);
     let stopping = Stopping::of(&plan.method);
-    let loads = Loads { nodal: &load, terms: &Terms::default() };
+    let loads = Loads { nodal: &load, terms: &Terms::default(), weight: &[] };
     let mut flow = Flow::zero(mesh);
     stokes.solve(&quadrature, loads, stopping, &mut flow).map_err(|source| SimError::Solve {
         step: 0,

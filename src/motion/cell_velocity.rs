@@ -56,6 +56,14 @@ impl CellVelocity {
         }
     }
 
+    /// Velocity from the nodal velocities of a cell without the correction.
+    pub fn uncorrected(nodal: &[[f64; 2]; NODES]) -> Self {
+        CellVelocity {
+            u: biquadratic(|along, across| nodal[3 * across + along][0]),
+            v: biquadratic(|along, across| nodal[3 * along + across][1]),
+        }
+    }
+
     /// Velocity at reference coordinates.
     pub fn at(&self, [xi, eta]: [f64; 2]) -> [f64; 2] {
         [value(&self.u, xi, eta), value(&self.v, eta, xi)]

@@ -48,7 +48,8 @@ pub type Kinks<'a> = dyn Fn(usize, &[[f64; 2]; NODES]) -> Option<(Kink, f64)> + 
 fn is_free(mesh: &Mesh, enclosure: &Enclosure, cell: usize) -> bool {
     let (i, j) = mesh.cell_ij(cell);
     let amid = |k: usize, axis: &Axis| k > 0 && k + 1 < axis.cells();
-    if !amid(i, &mesh.x) || !amid(j, &mesh.y) || mesh.block(cell).any(|c| mesh.solid[c]) {
+    let solid = |c: usize| mesh.solid[c] || mesh.part(c).is_some();
+    if !amid(i, &mesh.x) || !amid(j, &mesh.y) || mesh.block(cell).any(solid) {
         return false;
     }
     let extent = |k: usize, axis: &Axis| [axis.lines()[k - 1], axis.lines()[k + 2]];
@@ -156,7 +157,11 @@ impl<'a> FrozenFlow<'a> {
                     *u = [u[0] + psi * jump[0], u[1] + psi * jump[1]];
                 }
             }
-            *current = CellVelocity::new(&nodal, mesh.cell_size(cell));
+            *current = match mesh.part(cell) {
+                None => CellVelocity::new(&nodal, mesh.cell_size(cell)),
+                // It vanishes on the outline of the solid; corrected, it would not.
+                Some(_) => CellVelocity::uncorrected(&nodal),
+            };
         });
         let simd = Simd::used();
         FrozenFlow { mesh, enclosure, dt, velocities: cells, edges, free, simd }
@@ -249,7 +254,7 @@ impl<'a> FrozenFlow<'a> {
             return;
         }
         let (home, dt) = (self.home(cell), self.dt);
-        if self.edge(cell).is_some() {
+        if self.edge(cell).is_some() || self.mesh.part(cell).is_some() {
             from.iter().enumerate().for_each(|(k, &p)| arrive(k, self.travel(&home, p)));
             return;
         }

@@ -101,6 +101,9 @@ impl Counter {
             for s in 0..SAMPLES {
                 let t = (2 * s + 1) as f64 / SAMPLES as f64 - 1.0;
                 let r = if normal == 0 { [edge, t] } else { [t, edge] };
+                if mesh.is_solid_in(owner, mesh.from_reference(owner, r)) {
+                    continue;
+                }
                 let n = Shape::values(r);
                 let u: f64 = (0..9).map(|a| n[a] * nodal[a][normal]).sum();
                 let mut mean = KernelMean::new(mesh, owner, (r, normal), g.material);

@@ -1,7 +1,7 @@
 //! This module turns the boundary conditions of a scene into constraints.
 
 use super::resolve::values::Result;
-use super::resolve::walls::Walls;
+use super::resolve::walls::{SiBlock, Walls};
 use super::{Matter, Units};
 use crate::scene::{FieldFn, SceneError, WallKind};
 use crate::space::constraints::Constraints;
@@ -94,7 +94,14 @@ pub struct BoundaryPlan {
     pub free_translation: [bool; 2],
     /// Whether the pressure is determined only up to a constant.
     pub closed: bool,
+    /// Share of the prescribed outflow that is corrected, so that it balances the inflow on the sides
+    /// that solids cut.
+    pub correction: f64,
 }
+
+/// Imbalance of the prescribed velocities, relative to their sum, that is corrected where solids cut the
+/// sides.
+const LARGEST_CORRECTION: f64 = 0.02;
 
 /// Names of the sides, in the order of [`BoundaryPlan::sides`].
 pub const SIDES: [&str; 4] = ["left", "right", "bottom", "top"];
@@ -124,12 +131,20 @@ impl BoundaryPlan {
         let sides = self.sides.each_ref().map(Side::most_constraining_first);
         let pieces = || sides.iter().flatten();
         for pass in 0..2 {
-            for piece in pieces() {
+            for (upper, piece) in sides
+                .iter()
+                .enumerate()
+                .flat_map(|(s, pieces)| pieces.iter().map(move |piece| (s % 2 == 1, piece)))
+            {
                 let normal = piece.segment.normal;
                 let c = if pass == 0 { normal } else { 1 - normal };
                 if let Some(f) = &piece.conditions.velocity[c] {
                     for node in piece.segment.nodes(mesh) {
-                        out.fix(node, c, self.at_node(mesh, units, f, node) / units.velocity());
+                        let at = |[x, y]: [f64; 2]| f.at(x * units.length, y * units.length);
+                        let v = mesh.continued(node, normal, at) / units.velocity();
+                        let outwards = c == normal && (v > 0.0) == upper;
+                        let factor = if outwards { 1.0 - self.correction } else { 1.0 };
+                        out.fix(node, c, factor * v);
                     }
                 }
             }
@@ -163,6 +178,7 @@ impl BoundaryPlan {
         if self.closed {
             out.close();
         }
+        out.embed(mesh);
         out
     }
 
@@ -192,6 +208,14 @@ impl BoundaryPlan {
                 }
             }
         }
+        if mesh.parts().is_some() {
+            // Only the part of the sides that solids leave free counts; faces inside cancel.
+            let mut velocity = vec![[0.0; D]; mesh.nodes()];
+            given.impose(&mut velocity);
+            net = (0..mesh.cells())
+                .map(|cell| mesh.volume_rate(cell, |node| [velocity[node][0], velocity[node][1]]))
+                .sum();
+        }
         (net, total)
     }
 }
@@ -215,7 +239,7 @@ pub(super) fn boundary(
     for w in &walls.walls {
         add(w.segment, w.kind, w.rotation);
     }
-    for (range, kind) in &walls.blocks {
+    for SiBlock { range, kind, .. } in &walls.blocks {
         for normal in 0..2 {
             let [from, to] = range[1 - normal];
             for at in range[normal] {
@@ -226,15 +250,25 @@ pub(super) fn boundary(
     let held = |c: usize| {
         pieces(&sides).any(|(_, p)| p.conditions.velocity[c].is_some())
             || lines.iter().any(|w| w.segment.normal == c || w.no_slip)
+            || mesh
+                .parts()
+                .is_some_and(|parts| parts.solids.iter().any(|s| s.no_slip || s.outline.holds(c)))
     };
     // Inertia determines the velocity of a body that nothing holds.
     let free_translation = [0, 1].map(|c| !held(c) && !inertia);
     let compressible = state.materials.iter().any(|m| m.law.compliance > 0.0);
     let closed = !compressible
         && pieces(&sides).all(|(s, p)| p.conditions.velocity[side_normal(s)].is_some());
-    let plan = BoundaryPlan { sides, walls: lines, free_translation, closed };
+    let mut plan = BoundaryPlan { sides, walls: lines, free_translation, closed, correction: 0.0 };
     if closed {
-        let (net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
+        let (mut net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
+        if mesh.parts().is_some() && net != 0.0 && net.abs() < LARGEST_CORRECTION * total {
+            // The outflow depends linearly on the correction.
+            plan.correction = LARGEST_CORRECTION;
+            let (less, _) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
+            plan.correction *= net / (net - less);
+            (net, _) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
+        }
         if net.abs() > 1e-9 * total {
             return Err(SceneError::of_key(
                 "boundaries",

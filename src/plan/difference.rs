@@ -2,6 +2,7 @@
 
 use super::material::Material;
 use super::{Gauge, Matter, Plan, Tracers};
+use crate::space::parts::Parts;
 
 impl Plan {
     /// Short description of a difference other than the values of materials and gravity, which
@@ -70,13 +71,15 @@ fn times(p: &Plan) -> (Vec<f64>, Option<f64>, [f64; 3]) {
 fn geometry(p: &Plan) -> (Vec<f64>, Vec<[f64; 2]>) {
     let l = p.units.length;
     let lines = p.mesh.x.lines().iter().chain(p.mesh.y.lines()).map(|v| v * l).collect();
-    let walls = p
+    let walls: Vec<[f64; 2]> = p
         .enclosure
         .obstacles
         .iter()
         .flat_map(|o| [[o.at * l, o.normal as f64], [o.from * l, o.to * l]])
         .collect();
-    (lines, walls)
+    let outlines = p.mesh.parts().into_iter().flat_map(Parts::outlines);
+    let outlines = outlines.flat_map(|o| o.line().into_iter().map(|p| p.map(|v| v * l)));
+    (lines, walls.into_iter().chain(outlines).collect())
 }
 
 /// Whether the materials of both have the same particle columns and the same kind of law.

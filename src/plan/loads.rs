@@ -47,8 +47,16 @@ fn add_tractions<const D: usize>(
                     continue;
                 }
                 let nodes = mesh.cell_nodes(cell);
-                for (t, weight) in GAUSS_5 {
-                    let r = if normal == 0 { [edge, t] } else { [t, edge] };
+                let place = |t: f64| if normal == 0 { [edge, t] } else { [t, edge] };
+                // The part of a face that a solid covers is not loaded.
+                let free = |t: f64| !mesh.is_solid_in(cell, mesh.from_reference(cell, place(t)));
+                let covered = mesh.part(cell).is_some();
+                let fine = (0..if covered { PIECES } else { 0 })
+                    .map(|k| ((2 * k + 1) as f64 / PIECES as f64 - 1.0, 1.0 / PIECES as f64))
+                    .filter(|&(t, _)| free(t));
+                let whole = GAUSS_5.into_iter().filter(|_| !covered);
+                for (t, weight) in whole.chain(fine) {
+                    let r = place(t);
                     let p = mesh.from_reference(cell, r).map(|v| v * units.length);
                     let n = Shape::values(r);
                     let force =
@@ -62,7 +70,11 @@ fn add_tractions<const D: usize>(
     }
 }
 
-/// Adds the nodal forces of a force and couple per volume, integrated with 5 x 5 Gauss points.
+/// Number of pieces of a face that a solid may cover.
+const PIECES: usize = 64;
+
+/// Adds the nodal forces of a force and couple per volume, integrated with 5 x 5 Gauss points, or
+/// with the points of the part of the cell that solids leave free.
 fn add_body_force<const D: usize>(
     mesh: &Mesh,
     units: &Units,
@@ -72,17 +84,24 @@ fn add_body_force<const D: usize>(
     let scale = [units.force_density(), units.force_density(), units.stress()];
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let nodes = mesh.cell_nodes(cell);
+        let mut add = |r: [f64; 2], weight: f64| {
+            let p = mesh.from_reference(cell, r).map(|v| v * units.length);
+            let n = Shape::values(r);
+            let volume = weight * mesh.cell_volume(cell);
+            for c in 0..D {
+                let f = volume * force[c].at(p[0], p[1]) / scale[c];
+                for a in 0..NODES {
+                    load[nodes[a]][c] += f * n[a];
+                }
+            }
+        };
+        if let Some(part) = mesh.part(cell) {
+            part.points.iter().for_each(|p| add(p.r, p.weight));
+            continue;
+        }
         for (eta, wy) in GAUSS_5 {
             for (xi, wx) in GAUSS_5 {
-                let p = mesh.from_reference(cell, [xi, eta]).map(|v| v * units.length);
-                let n = Shape::values([xi, eta]);
-                let volume = wx * wy * mesh.cell_volume(cell);
-                for c in 0..D {
-                    let f = volume * force[c].at(p[0], p[1]) / scale[c];
-                    for a in 0..NODES {
-                        load[nodes[a]][c] += f * n[a];
-                    }
-                }
+                add([xi, eta], wx * wy);
             }
         }
     }

@@ -27,6 +27,7 @@ pub use warning::Warning;
 use crate::scene::{ColourBy, FieldFn, FieldName, Integrator, Quadrature, Scene};
 use crate::space::constraints::PressurePoint;
 use crate::space::mesh::Mesh;
+use crate::space::outline::Outline;
 use crate::space::seeding::Seeding;
 use crate::space::segment::Segment;
 use crate::space::walls::Enclosure;
@@ -177,6 +178,8 @@ pub enum Area {
         /// Radius, m.
         radius: f64,
     },
+    /// A polygon, m.
+    Polygon(Outline),
     /// The points where the function is above zero.
     Where(FieldFn),
 }
@@ -190,6 +193,7 @@ impl Area {
             Area::Circle { centre, radius } => {
                 (px - centre[0]).powi(2) + (py - centre[1]).powi(2) < radius * radius
             }
+            Area::Polygon(outline) => outline.contains([px, py]),
             Area::Where(f) => f.at(px, py) > 0.0,
         }
     }

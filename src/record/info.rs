@@ -5,7 +5,7 @@ use crate::frame::{
 };
 use crate::plan::Plan;
 use crate::plan::boundary::SIDES;
-use crate::scene::{ColourBy, FieldName, scene_hash, to_toml};
+use crate::scene::{Block, ColourBy, FieldName, Shape, scene_hash, to_toml};
 use crate::sim::row::{Panel, Place, Row, places};
 use crate::space::segment::Segment;
 
@@ -25,12 +25,15 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         .filter(|(s, piece)| plan.boundary.sides[*s].pieces.len() == 1 || !piece.open)
         .map(|(s, piece)| Outline { name: SIDES[s].into(), points: ends(&piece.segment) })
         .collect();
+    let aligned = |b: &&Block| matches!(b.shape, None | Some(Shape::Rectangle { .. }));
+    let blocks = plan.scene.blocks.iter().filter(aligned);
     let names = plan
         .scene
         .walls
         .iter()
+        .filter(|w| w.thickness.is_none())
         .map(|w| w.name.clone())
-        .chain(plan.scene.blocks.iter().flat_map(|b| vec![b.name.clone(); 4]));
+        .chain(blocks.flat_map(|b| vec![b.name.clone(); 4]));
     walls.extend(
         plan.enclosure
             .obstacles
@@ -38,6 +41,11 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
             .zip(names)
             .map(|(o, name)| Outline { name, points: ends(o) }),
     );
+    let solids = plan.mesh.parts().into_iter().flat_map(|parts| &parts.solids);
+    walls.extend(solids.map(|s| {
+        let points = s.outline.line().into_iter().map(|p| p.map(f)).collect();
+        Outline { name: s.name.clone(), points }
+    }));
     let undrawn = plan.background().map(|b| &plan.state.materials[b as usize].name);
     let materials: Vec<Material> = plan
         .state

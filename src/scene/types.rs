@@ -486,6 +486,16 @@ pub enum Shape {
         ))]
         y: [Quantity; 2],
     },
+    /// A polygon: its corners, in order, each as `[x, y]`.
+    Polygon(
+        /// Corners in the order of the outline.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "three or more; the outline must not cross itself",
+            "examples" = [[[0, 0], [1, 0], [0.5, 1]]]
+        ))]
+        Vec<[Quantity; 2]>,
+    ),
     /// A circle.
     #[schemars(extend("examples" = [{ "centre": [0.5, 0.5], "radius": 0.25 }]))]
     Circle {
@@ -755,6 +765,16 @@ pub struct Wall {
         "examples" = [["aperture", 0.5]]
     ))]
     pub to: [Quantity; 2],
+    /// Thickness of the wall. Walls that are not along x or y need one; with it, a wall is a solid that
+    /// may cut through cells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "> 0",
+        "x-default" = "none: along a mesh line",
+        "examples" = [0.05]
+    ))]
+    pub thickness: Option<Quantity>,
     /// Kind of boundary condition on both faces.
     #[serde(default)]
     #[schemars(extend("examples" = ["no_slip"]))]
@@ -781,27 +801,40 @@ pub enum WallKind {
     NoSlip,
 }
 
-/// A solid rectangle inside the domain.
+/// A solid inside the domain: a rectangle along mesh lines (`x` and `y`) or any shape.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// Name of the block.
     #[schemars(extend("examples" = ["step"]))]
     pub name: String,
-    /// Range along x: lower and upper end.
+    /// Range along x: lower and upper end. Needs `y`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
         "x-unit" = "m",
         "x-range" = "in the domain; ascending",
+        "x-default" = "given by `shape`",
         "examples" = [[0, 0.5]]
     ))]
-    pub x: [Quantity; 2],
-    /// Range along y: lower and upper end.
+    pub x: Option<[Quantity; 2]>,
+    /// Range along y: lower and upper end. Needs `x`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
         "x-unit" = "m",
         "x-range" = "in the domain; ascending",
+        "x-default" = "given by `shape`",
         "examples" = [[0, 0.25]]
     ))]
-    pub y: [Quantity; 2],
+    pub y: Option<[Quantity; 2]>,
+    /// Shape of the solid, instead of `x` and `y`: `rectangle`, `polygon` or `circle`. It may cut
+    /// through cells and reach out of the domain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "touching the domain",
+        "x-default" = "given by `x` and `y`",
+        "examples" = [{ "polygon": [[0, 0], [0.5, 0], [0, 0.5]] }]
+    ))]
+    pub shape: Option<Shape>,
     /// Kind of boundary condition on its faces.
     #[serde(default)]
     #[schemars(extend("examples" = ["no_slip"]))]

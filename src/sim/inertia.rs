@@ -21,7 +21,7 @@ use crate::solve::density::Density;
 use crate::solve::terms::inertia::{Inertia as Term, Mass};
 use crate::space::flow::{Flow, interpolate};
 use crate::space::mesh::{Axis, Mesh};
-use crate::space::shape::{GAUSS_6X6, NODES, Shape};
+use crate::space::shape::{NODES, SUBPOINTS, Shape};
 use crate::threads;
 
 /// Largest number of cells per task.
@@ -129,9 +129,13 @@ impl Inertia {
                 return;
             }
             let volume = mesh.cell_volume(cell);
-            let from = GAUSS_6X6.each_ref().map(|g| mesh.from_reference(cell, g.r));
+            let (mut from, mut count) = ([[0.0; 2]; SUBPOINTS], 0);
+            density.for_fine_points(cell, |point| {
+                from[count] = mesh.from_reference(cell, point.r);
+                count += 1;
+            });
             let mut origins = from.map(|at| (cell, at));
-            last_flow.travel_all(cell, &from, |q, way| origins[q] = end(mesh, &way));
+            last_flow.travel_all(cell, &from[..count], |q, way| origins[q] = end(mesh, &way));
             let mut origins = origins.into_iter();
             density.for_fine_points(cell, |point| {
                 let Some(mut one) = origins.next() else { return };

@@ -64,8 +64,11 @@ pub fn particles(plan: &Plan) -> Result<(Particles, Vec<usize>), Unfilled> {
             let r = mesh.to_reference(cell, position);
             members.push(Member { r, share: 1.0 / places.len() as f64, material, filling });
         }
-        let samples = samples(plan, cell);
-        divide(plan, cell, &samples, &mut members);
+        // Next to a solid, each particle is of the material at its place.
+        if mesh.part(cell).is_none() {
+            let samples = samples(plan, cell);
+            divide(plan, cell, &samples, &mut members);
+        }
         let (i, j) = mesh.cell_ij(cell);
         let angles = spread_angles(members.len(), [i, j], start, &mut random);
         let first = out.len();

@@ -108,6 +108,9 @@ impl<'a> Sampler<'a> {
                         cuts.push(self.fraction(across, c));
                     }
                 }
+                Area::Polygon(outline) => {
+                    cuts.extend(outline.line().iter().map(|p| self.fraction(across, p[across])));
+                }
                 Area::Everywhere | Area::Where(_) => {}
             }
         }
@@ -148,6 +151,15 @@ impl<'a> Sampler<'a> {
                     if half2 > 0.0 {
                         for s in [-1.0, 1.0] {
                             cuts.push(self.fraction(along, centre[along] + s * half2.sqrt()));
+                        }
+                    }
+                }
+                Area::Polygon(outline) => {
+                    for edge in outline.line().windows(2) {
+                        let [from, to] = [0, 1].map(|k| edge[k][across] - c);
+                        if (from > 0.0) != (to > 0.0) {
+                            let [a, b] = [edge[0][along], edge[1][along]];
+                            cuts.push(self.fraction(along, a + (b - a) * from / (from - to)));
                         }
                     }
                 }
@@ -219,6 +231,10 @@ fn may_cut(shape: &Area, range: [[f64; 2]; 2]) -> bool {
     match shape {
         Area::Everywhere => false,
         Area::Where(_) => true,
+        Area::Polygon(outline) => {
+            let extent = outline.extent();
+            (0..2).all(|a| extent[a][0] < range[a][1] && extent[a][1] > range[a][0])
+        }
         Area::Rectangle { x, y } => {
             let sides = [x, y];
             let meets = |a: usize| sides[a][0] < range[a][1] && sides[a][1] > range[a][0];

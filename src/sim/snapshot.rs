@@ -203,7 +203,7 @@ impl<const D: usize> Simulation<D> {
                 let value = |k: usize| {
                     let (x, y) = (&columns[k % raster.n[0]], &rows[k / raster.n[0]]);
                     let cell = mesh.cell(x.cell, y.cell);
-                    if mesh.solid[cell] {
+                    if mesh.is_solid_in(cell, raster.centre(k)) {
                         return f32::NAN;
                     }
                     let nodes = mesh.cell_nodes(cell);
@@ -260,7 +260,11 @@ impl<const D: usize> Simulation<D> {
         threads::for_each(&mut values, SAMPLE_GRAIN, |k, v| {
             let (x, y) = (&columns[k % raster.n[0]], &rows[k / raster.n[0]]);
             let cell = mesh.cell(x.cell, y.cell);
-            let local = if mesh.solid[cell] { None } else { self.local_at(cell, [x.r, y.r]) };
+            let local = if mesh.is_solid_in(cell, raster.centre(k)) {
+                None
+            } else {
+                self.local_at(cell, [x.r, y.r])
+            };
             *v = value(local) as f32;
         });
         values
@@ -298,7 +302,7 @@ impl<const D: usize> Simulation<D> {
         let plan = &self.plan;
         let raster = Raster::new(plan, ARROWS);
         let mesh = &plan.mesh;
-        let fluid = |k: &usize| !mesh.solid[mesh.locate(raster.centre(*k))];
+        let fluid = |k: &usize| !mesh.is_solid_at(raster.centre(*k));
         let points: Vec<usize> = (0..raster.len()).filter(fluid).collect();
         let velocities: Vec<[f64; 2]> = points
             .iter()

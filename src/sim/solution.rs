@@ -51,7 +51,8 @@ impl<const D: usize> Simulation<D> {
         self.update_inertia();
         seconds.weight += phase.elapsed().as_secs_f64();
         let stopping = Stopping::of(&plan.method);
-        let loads = Loads { nodal: &self.load, terms: &self.terms };
+        let weight = self.mean_weight();
+        let loads = Loads { nodal: &self.load, terms: &self.terms, weight: &weight };
         let Simulation { stokes, quadrature, particles, matter, flow, .. } = self;
         let failed =
             |s: SolveError| SimError::Solve { step, time, source: s.scaled(plan.units.length) };
@@ -146,6 +147,22 @@ impl<const D: usize> Simulation<D> {
         report.power_in -= power;
         report.restoring -= taken;
         report.inertia = taken - power;
+    }
+
+    /// Weight per volume of each cell, if there are solids of any shape.
+    fn mean_weight(&self) -> Vec<[f64; 2]> {
+        let (plan, mesh) = (&self.plan, &self.plan.mesh);
+        if mesh.parts().is_none() || !plan.has_mass() {
+            return vec![];
+        }
+        let unit = plan.units.acceleration();
+        let weight = |cell: usize| {
+            let [x, y] = plan.si(mesh.cell_centre(cell));
+            let further = plan.acceleration.as_ref();
+            let further = further.map_or([0.0; 2], |a| a.each_ref().map(|a| a.at(x, y) / unit));
+            [0, 1].map(|c| self.density.mean(cell) * (self.matter.gravity[c] + further[c]))
+        };
+        (0..mesh.cells()).map(weight).collect()
     }
 
     fn update_load(&mut self) {

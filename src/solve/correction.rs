@@ -1,7 +1,7 @@
 //! This module computes one correction of velocity and pressure and combines it with the previous
 //! corrections.
 
-use super::element::SKELETON_NODES;
+use super::element::{SKELETON_NODES, expand, reduce};
 use super::multifrontal::tree::NO_POSITION;
 use super::problem::{CELL_GRAIN, Correction, NODE_GRAIN, Stokes, Work, add_scaled};
 use super::quadrature::Quadrature;
@@ -22,6 +22,8 @@ impl<const D: usize> Stokes<D> {
             (0..D).filter(|&c| constraints.is_fixed(node, c)).for_each(|c| force[c] = 0.0);
             force
         };
+        let relations = constraints.embedding();
+        let map = |cell: usize| relations.and_then(|r| r.of_cell(cell));
         let shares = &mut shares[..mesh.cells()];
         // The right-hand side of each cell, with the centre node condensed; the entry of the centre
         // holds the whole force.
@@ -33,7 +35,10 @@ impl<const D: usize> Stokes<D> {
             let p: [f64; 3] =
                 std::array::from_fn(|q| -matrix.penalty[q] * residual.divergence[cell][q]);
             let mut force = [[0.0; D]; NODES];
-            Divergence::new(mesh.cell_measure(cell)).add_transposed(&p, &mut force);
+            Divergence::new(mesh, cell).add_transposed(&p, &mut force);
+            if let Some(map) = map(cell) {
+                reduce(&mut force, map);
+            }
             let node = incidence.nodes[cell][CENTRE];
             let whole = std::array::from_fn(|c| force[CENTRE][c] + residual.force[node][c]);
             force[CENTRE] = free(node, whole);
@@ -80,8 +85,11 @@ impl<const D: usize> Stokes<D> {
                 }
             }
             share.force[CENTRE] = du[CENTRE];
-            let measure = mesh.cell_measure(cell);
-            let (bdu, mass) = (Divergence::new(measure).apply(&du), measure.pressure_mass());
+            if let Some(map) = map(cell) {
+                expand(&mut du, map);
+            }
+            let mass = mesh.cell_measure(cell).pressure_mass();
+            let bdu = Divergence::new(mesh, cell).apply(&du);
             for q in 0..3 {
                 let dp = -matrix.penalty[q] * (residual.divergence[cell][q] + bdu[q]);
                 share.sums[q] = dp;
@@ -103,6 +111,9 @@ impl<const D: usize> Stokes<D> {
         });
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
             correction.velocity[incidence.nodes[cell][CENTRE]] = shares[cell].force[CENTRE];
+        }
+        if let Some(relations) = relations {
+            relations.expand(&mut correction.velocity);
         }
     }
 

@@ -37,6 +37,7 @@ use crate::space::fit::{Degree, Fit, Polynomial};
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
+use crate::space::parts::{Part, SharedParts};
 use crate::space::shape::{GAUSS_3, GAUSS_3X3, GAUSS_6X6, NODES, SUBPOINTS};
 use std::sync::LazyLock;
 
@@ -66,6 +67,8 @@ pub struct Density {
     densities: Vec<Option<Polynomial>>,
     /// Whether densities lie nowhere below that of the lightest material.
     bounded: bool,
+    /// Parts of cells with solids of any shape in them; their density is constant.
+    parts: SharedParts,
 }
 
 /// Densities of a cell cut by a straight line, at the points of [`GAUSS_6X6`].
@@ -121,6 +124,7 @@ impl Density {
             fits: vec![Fit::default(); materials],
             densities: Vec::with_capacity(materials),
             bounded,
+            parts: mesh.shared_parts(),
         }
     }
 
@@ -147,7 +151,10 @@ impl Density {
                     let fits = self.fits.iter();
                     self.densities.clear();
                     self.densities.extend(fits.map(|f| f.solve(Degree::Quadratic)));
-                    let linear = self.at_gauss(materials);
+                    let mut linear = self.at_gauss(materials);
+                    if mesh.part(cell).is_some() {
+                        linear = [self.mean_of_shares(materials); 9];
+                    }
                     if let Some(sides) = quadrature.cut(cell).and_then(|cut| cut.sides.as_ref()) {
                         let densities = self.sides(sides, &linear, materials);
                         self.of_sides[cell] = Some(match kept {
@@ -165,6 +172,10 @@ impl Density {
         }
     }
 
+    fn part(&self, cell: usize) -> Option<&Part> {
+        self.parts.as_deref()?.of(cell)
+    }
+
     /// Mean density of a cell.
     pub fn mean(&self, cell: usize) -> f64 {
         self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum()
@@ -178,7 +189,12 @@ impl Density {
 
     /// Calls `f` for each integration point.
     pub fn for_points(&self, cell: usize, mut f: impl FnMut(MassPoint)) {
-        if let Some(sides) = &self.of_sides[cell] {
+        if let Some(part) = self.part(cell) {
+            for p in &part.points {
+                let mass = p.weight * self.at_gauss[cell][0];
+                f(MassPoint { mass, kinked: 0.0, r: p.r, n: &p.shape.n });
+            }
+        } else if let Some(sides) = &self.of_sides[cell] {
             let densities = sides.density.iter().zip(&sides.kinked);
             for ((density, kinked), g) in densities.zip(GAUSS_6X6.iter()) {
                 let [mass, kinked] = [density, kinked].map(|d| g.weight * d);
@@ -194,7 +210,7 @@ impl Density {
     /// Calls `f` for each of the points of [`GAUSS_6X6`]. Integrals of polynomials are those of
     /// [`Density::for_points`].
     pub fn for_fine_points(&self, cell: usize, mut f: impl FnMut(MassPoint)) {
-        if self.of_sides[cell].is_some() {
+        if self.of_sides[cell].is_some() || self.part(cell).is_some() {
             return self.for_points(cell, f);
         }
         for (q, g) in GAUSS_6X6.iter().enumerate() {
@@ -249,6 +265,14 @@ impl Density {
             }
         }
         density
+    }
+
+    /// Mean density of the materials of the cell, after its fits.
+    fn mean_of_shares(&self, materials: &[Material]) -> f64 {
+        let of = |m: usize| {
+            self.centroids.share(m) * self.of_material(m, self.centroids.centroid(m), materials)
+        };
+        (0..materials.len()).filter(|&m| self.centroids.share(m) > 0.0).map(of).sum()
     }
 
     /// Densities at the points of [`GAUSS_3X3`] for shares that vary linearly.

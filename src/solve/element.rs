@@ -5,6 +5,7 @@
 //! `a`. `D` is 2 for the classical continuum, 3 with Cosserat rotation.
 
 use crate::laws::rates::Rates;
+use crate::space::embedding::CellMap;
 use crate::space::shape::{CENTRE, NODES, Shape};
 
 /// Number of local unknowns with rotation; classical elements use the first 18.
@@ -82,6 +83,52 @@ pub fn mirror<const D: usize>(k: &mut Matrix) {
     for i in NODES..NODES * D {
         for j in 0..i - i % NODES {
             k[j][i] = k[i][j];
+        }
+    }
+}
+
+/// Replaces the matrix of the velocities of a cell by that of its unknowns, `P' k P` with the map `P`.
+pub fn embed<const D: usize>(k: &mut Matrix, map: &CellMap) {
+    const U: usize = 2 * NODES;
+    let mut half: Matrix = [[0.0; LOCAL]; LOCAL];
+    for i in 0..NODES * D {
+        for j in 0..U {
+            half[i][j] = (0..U).map(|m| k[i][m] * map[m][j]).sum();
+        }
+        half[i][U..].copy_from_slice(&k[i][U..]);
+    }
+    *k = half;
+    for i in 0..U {
+        for j in 0..NODES * D {
+            k[i][j] = (0..U).map(|m| map[m][i] * half[m][j]).sum();
+        }
+    }
+    // Rounding differs between the two triangles.
+    for i in 0..NODES * D {
+        for j in 0..i {
+            k[j][i] = k[i][j];
+        }
+    }
+}
+
+/// Forces on the unknowns of a cell, `P' f`.
+pub fn reduce<const D: usize>(f: &mut Nodal<D>, map: &CellMap) {
+    let before = *f;
+    for b in 0..NODES {
+        for d in 0..2 {
+            let rows = (0..2 * NODES).map(|i| map[i][NODES * d + b] * before[i % NODES][i / NODES]);
+            f[b][d] = rows.sum();
+        }
+    }
+}
+
+/// Velocities of a cell with the given unknowns, `P q`.
+pub fn expand<const D: usize>(q: &mut Nodal<D>, map: &CellMap) {
+    let before = *q;
+    for a in 0..NODES {
+        for c in 0..2 {
+            let row = &map[NODES * c + a];
+            q[a][c] = (0..2 * NODES).map(|j| row[j] * before[j % NODES][j / NODES]).sum();
         }
     }
 }

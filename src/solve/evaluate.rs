@@ -64,8 +64,13 @@ impl Evaluation<'_> {
             let (law, softening) = material.law.with_softening(&here);
             out.points[g].law = law;
             *out.mean_viscosity += weight * law.shear.mean();
-            out.soften(Place::Gauss(g as u8), weight, softening);
+            out.soften(self.place(cell, g, r), weight, softening);
         }
+    }
+
+    /// Point `g` of a cell, at the reference coordinates `r`.
+    fn place(&self, cell: usize, g: usize, r: [f64; 2]) -> Place {
+        if self.mesh.part(cell).is_some() { Place::At(r) } else { Place::Gauss(g as u8) }
     }
 
     /// Evaluates a mixed cell.
@@ -79,6 +84,8 @@ impl Evaluation<'_> {
         scratch.gather(self.mesh, cell, self.particles, self.kinds);
         scratch.fit_viscosities();
         let form = match self.rule {
+            // The arrangement next to a solid is not known.
+            _ if self.mesh.part(cell).is_some() => Form::Film,
             Rule::Laminate | Rule::Sides => self.form(cell, scratch),
             Rule::Mixture | Rule::Particles => Form::Mixture,
         };
@@ -207,7 +214,8 @@ impl Evaluation<'_> {
                 out.fractions[m] += weight * phi;
                 *out.compliance += weight * phi * material.law.compliance;
                 if softened > 0.0 {
-                    out.soften(Place::Gauss(g as u8), weight * phi * softened, softening);
+                    let place = self.place(cell, g, r);
+                    out.soften(place, weight * phi * softened, softening);
                 }
             }
             let law = mixture.law();

@@ -1,7 +1,7 @@
 //! This module computes the element matrices of all cells, again only for cells that changed.
 
 use super::element::{
-    CellBlocks, Centre, LOCAL, Matrix, Nodal, PointShape, condense, mirror, pair,
+    CellBlocks, Centre, LOCAL, Matrix, Nodal, PointShape, condense, embed, mirror, pair,
 };
 use super::quadrature::Quadrature;
 use super::terms::pressure::Divergence;
@@ -32,7 +32,7 @@ pub struct CellMatrix<const D: usize> {
     pub centre: Centre<D>,
     /// Diagonal of the element matrix without the penalty.
     pub diagonal: Nodal<D>,
-    /// `W = (C + Mp / (r eta))^-1`, for the pressures `1, xi, eta`.
+    /// `W = (C + Mp / (r eta))^-1`, for the pressures `1, xi, eta`; zero for those that are given.
     pub penalty: [f64; 3],
 }
 
@@ -82,6 +82,14 @@ impl<const D: usize> CellMatrix<D> {
         diagonal: [[0.0; D]; NODES],
         penalty: [0.0; 3],
     };
+
+    fn set_diagonal(&mut self, k: &Matrix) {
+        for a in 0..NODES {
+            for c in 0..D {
+                self.diagonal[a][c] = k[NODES * c + a][NODES * c + a];
+            }
+        }
+    }
 }
 
 impl<const D: usize> Matrices<D> {
@@ -195,14 +203,33 @@ impl<const D: usize> Fresh<D> {
             + terms.inertia.resistance(cell, measure.volume(), size[0].max(size[1]));
         let penalty = if quadrature.flows(cell) { FLOWING_PENALTY } else { PENALTY };
         let compliance = 1.0 / (penalty * viscosity) + quadrature.compliance[cell];
+        let divergence = Divergence::new(mesh, cell);
         self.matrix.penalty = mass.map(|m| 1.0 / (m * compliance));
-        for a in 0..NODES {
-            for c in 0..D {
-                self.matrix.diagonal[a][c] = k[NODES * c + a][NODES * c + a];
+        for (penalty, unknown) in self.matrix.penalty.iter_mut().zip(divergence.unknown()) {
+            if !unknown {
+                *penalty = 0.0;
             }
         }
-        Divergence::new(measure).add_penalty(&self.matrix.penalty, &mut k);
+        let map = constraints.embedding().and_then(|relations| relations.of_cell(cell));
+        if let Some(map) = map {
+            // Where all velocities are given, no pressure can change their divergence.
+            let free =
+                |a: usize| (0..2).any(|c| !constraints.is_fixed(incidence.nodes[cell][a], c));
+            if !(0..NODES).any(free) {
+                self.matrix.penalty = [0.0; 3];
+            }
+            let mut free = k;
+            mirror::<D>(&mut free);
+            embed::<D>(&mut free, map);
+            self.matrix.set_diagonal(&free);
+        } else {
+            self.matrix.set_diagonal(&k);
+        }
+        divergence.add_penalty(&self.matrix.penalty, &mut k);
         mirror::<D>(&mut k);
+        if let Some(map) = map {
+            embed::<D>(&mut k, map);
+        }
         for (a, node) in incidence.nodes[cell].into_iter().enumerate() {
             for c in 0..D {
                 if constraints.is_fixed(node, c) {

@@ -172,6 +172,7 @@ impl<const D: usize> Stokes<D> {
         loop {
             let clock = Instant::now();
             self.constraints.remove_null_space(&self.mesh, flow);
+            flow.continue_slopes(&self.mesh, loads.weight);
             let near = report.decrement.is_some_and(|d| d <= NEAR) && updates < most_updates;
             if near {
                 // The pressure may alternate about the solution; the mean of two iterates does not.
@@ -282,11 +283,15 @@ impl<const D: usize> Stokes<D> {
     /// `r . du`, the power of the residual with the correction.
     fn slope(&self, work: &Work<D>) -> f64 {
         let (force, du) = (&work.residual.force, &work.correction.velocity);
+        let relations = self.constraints.embedding();
         let [slope] = threads::sum(0..self.mesh.nodes(), |node| {
-            let free = (0..D).filter(|&c| !self.constraints.is_fixed(node, c));
+            let first = if relations.is_some_and(|r| r.holds(node)) { 2 } else { 0 };
+            let free = (first..D).filter(|&c| !self.constraints.is_fixed(node, c));
             [free.map(|c| force[node][c] * du[node][c]).sum()]
         });
-        slope
+        let Some(relations) = relations else { return slope };
+        let on_solids = relations.nodes().zip(&work.residual.on_solids);
+        slope + on_solids.map(|(node, f)| f[0] * du[node][0] + f[1] * du[node][1]).sum::<f64>()
     }
 
     /// Share of the correction to be applied, at most one, and whether laws and residual are those

@@ -39,20 +39,23 @@ impl CutStiffness {
 }
 
 /// Points of a cell that share a rule.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place {
     /// Point of [`GAUSS_3X3`].
     Gauss(u8),
     /// Point of [`GAUSS_6X6`].
     Fine(u8),
+    /// Reference coordinates of a point of a cell with a solid in it.
+    At([f64; 2]),
 }
 
 impl Place {
     /// Shape functions at the point.
-    pub fn shape(self) -> &'static Shape {
+    pub fn shape(self) -> Shape {
         match self {
-            Place::Gauss(g) => &GAUSS_3X3[usize::from(g)].shape,
-            Place::Fine(g) => &GAUSS_6X6[usize::from(g)].shape,
+            Place::Gauss(g) => GAUSS_3X3[usize::from(g)].shape,
+            Place::Fine(g) => GAUSS_6X6[usize::from(g)].shape,
+            Place::At(r) => Shape::at(r),
         }
     }
 }

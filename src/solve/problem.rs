@@ -48,6 +48,8 @@ pub struct Loads<'a, const D: usize> {
     pub nodal: &'a [[f64; D]],
     /// Terms that only some scenes have.
     pub terms: &'a Terms,
+    /// Weight per volume of each cell; it is used only where solids of any shape are.
+    pub weight: &'a [[f64; 2]],
 }
 
 /// Inputs of a solution.
@@ -89,7 +91,7 @@ pub(super) struct Share<const D: usize> {
 }
 
 /// Number of sums over cells in a [`Residual`].
-pub(super) const SUMS: usize = 7;
+pub(super) const SUMS: usize = 8;
 
 impl<const D: usize> Default for Share<D> {
     fn default() -> Self {
@@ -100,8 +102,11 @@ impl<const D: usize> Default for Share<D> {
 /// Residuals of a flow, with powers and norms that are computed with them.
 #[derive(Default)]
 pub(super) struct Residual<const D: usize> {
-    /// `f - K u + B' p`, including constrained rows.
+    /// `f - K u + B' p`, including constrained rows; for nodes with relations that on their unknowns.
     pub(super) force: Vec<[f64; D]>,
+    /// The same for the velocities of the nodes with relations, in the order of
+    /// [`Embedding::nodes`](crate::space::embedding::Embedding::nodes).
+    pub(super) on_solids: Vec<[f64; D]>,
     /// `B u + C p`.
     pub(super) divergence: Vec<[f64; 3]>,
     /// Viscous dissipation.
@@ -118,6 +123,8 @@ pub(super) struct Residual<const D: usize> {
     pub(super) penalty_norm: f64,
     /// `integral p^2`.
     pub(super) pressure_square: f64,
+    /// Power of the pressures that are given in cells with solids in them.
+    pub(super) continued: f64,
     /// Largest mean viscosity of a cell.
     pub(super) stiffest: f64,
 }

@@ -36,11 +36,17 @@ use crate::space::constraints::FixedSides;
 use crate::space::kink::Kink;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
+use crate::space::parts::{Part, Parts, SharedParts};
 use crate::space::shape::{GAUSS_3X3, NODES, Shape};
 use crate::threads;
 
 /// Largest number of cells per task.
 const GRAIN: usize = 32;
+
+/// Part of the viscosities that cells with a solid of any shape in them have everywhere, inside of
+/// the solid too, so that their matrix is definite however little is left of them. Between 1e-8
+/// and 1e-4 the flow is the same to four digits.
+const INSIDE_SOLIDS: f64 = 1e-6;
 
 /// Integration points of all cells, and means that the solver needs.
 pub struct Quadrature {
@@ -53,6 +59,8 @@ pub struct Quadrature {
     pub(super) start: Vec<u32>,
     /// Sides of each cell on which the velocity is prescribed.
     walls: Vec<FixedSides>,
+    /// Parts of cells with solids of any shape in them.
+    parts: SharedParts,
     /// Stiffness of cut cells.
     cut: Vec<Option<Box<CutStiffness>>>,
     /// Mean viscosity of each cell; where a laminate is used, the mean by volume. It scales the
@@ -85,6 +93,11 @@ impl Quadrature {
                     let g = &GAUSS_3X3[k % 9];
                     (point.weight, point.r) = (g.weight, g.r);
                 }
+                for (cell, part) in mesh.parts().into_iter().flat_map(Parts::all) {
+                    for (point, of) in points[9 * cell..].iter_mut().zip(&part.points) {
+                        (point.weight, point.r) = (of.weight, of.r);
+                    }
+                }
                 (points, (0..=cells as u32).map(|c| 9 * c).collect())
             }
             Rule::Particles => (Vec::new(), vec![0; cells + 1]),
@@ -96,6 +109,7 @@ impl Quadrature {
             points,
             start,
             walls: vec![FixedSides::default(); cells],
+            parts: mesh.shared_parts(),
             cut: vec![None; cells],
             mean_viscosity: vec![0.0; cells],
             compliance: vec![0.0; cells],
@@ -154,11 +168,18 @@ impl Quadrature {
     /// The nine points of a cell, row by row from below, if they are those of the Gauss rule.
     pub fn gauss_points(&self, cell: usize) -> Option<&[IntegrationPoint; 9]> {
         match self.rule {
+            _ if self.part(cell).is_some() => None,
             Rule::Mixture | Rule::Laminate | Rule::Sides => {
                 self.points[9 * cell..9 * cell + 9].try_into().ok()
             }
             Rule::Particles => None,
         }
+    }
+
+    /// The part of a cell that solids leave free, if there is a solid in it.
+    #[inline(always)]
+    fn part(&self, cell: usize) -> Option<&Part> {
+        self.parts.as_deref()?.of(cell)
     }
 
     /// Viscous stiffness of a cut cell. Its integration points then have only a part of their
@@ -224,7 +245,18 @@ impl Quadrature {
         let range = self.start[cell] as usize..self.start[cell + 1] as usize;
         match self.rule {
             Rule::Mixture | Rule::Laminate | Rule::Sides => {
-                for (p, g) in self.points[range].iter().zip(GAUSS_3X3.iter()) {
+                let points = &self.points[range];
+                if let Some(part) = self.part(cell) {
+                    for (p, of) in points.iter().zip(&part.points) {
+                        f(p, &of.shape);
+                    }
+                    for (p, g) in points.iter().zip(GAUSS_3X3.iter()) {
+                        let (law, weight) = (p.law.scaled(INSIDE_SOLIDS), g.weight);
+                        f(&IntegrationPoint { law, density: 0.0, weight, r: g.r }, &g.shape);
+                    }
+                    return;
+                }
+                for (p, g) in points.iter().zip(GAUSS_3X3.iter()) {
                     f(p, &g.shape);
                 }
             }

@@ -29,7 +29,7 @@ impl<const D: usize> Stokes<D> {
     pub(super) fn residual(
         &self,
         quadrature: &Quadrature,
-        Loads { nodal, terms }: Loads<D>,
+        Loads { nodal, terms, .. }: Loads<D>,
         flow: &Flow<D>,
         work: &mut Work<D>,
     ) {
@@ -45,7 +45,7 @@ impl<const D: usize> Stokes<D> {
         let shares = &shares[..cells];
         let sums = threads::sum(0..shares.len(), |cell| shares[cell].sums);
         [out.dissipation, out.strain, out.divergence_norm, out.restoring, ..] = sums;
-        [.., out.pressure_norm, out.penalty_norm, out.pressure_square] = sums;
+        [.., out.pressure_norm, out.penalty_norm, out.pressure_square, out.continued] = sums;
         let cells = (0..self.mesh.cells()).filter(|&c| !self.mesh.solid[c]);
         out.stiffest = cells.map(|c| quadrature.mean_viscosity[c]).fold(0.0, f64::max);
         out.divergence.clear();
@@ -64,6 +64,11 @@ impl<const D: usize> Stokes<D> {
                     out.force[node][1] += f[1];
                 }
             }
+        }
+        if let Some(relations) = self.constraints.embedding() {
+            out.on_solids.clear();
+            out.on_solids.extend(relations.nodes().map(|node| out.force[node]));
+            relations.reduce(&mut out.force);
         }
     }
 
@@ -99,25 +104,36 @@ impl<const D: usize> Stokes<D> {
         share: &mut Share<D>,
     ) {
         let nodes = &self.incidence.nodes[cell];
-        let measure = self.mesh.cell_measure(cell);
         let u = nodes.map(|n| flow.velocity[n]);
-        let divergence = Divergence::new(measure);
-        let mass = measure.pressure_mass();
+        let divergence = Divergence::new(&self.mesh, cell);
+        let mass = self.mesh.cell_measure(cell).pressure_mass();
+        let relations = self.constraints.embedding();
         let pressure = flow.pressure[cell];
         let compliance = quadrature.compliance[cell];
         let mut force = [[0.0; D]; NODES];
         divergence.add_transposed(&pressure, &mut force);
         let mut pressure_norm = 0.0;
         for (a, &node) in nodes.iter().enumerate() {
+            if relations.is_some_and(|r| r.holds(node)) {
+                continue;
+            }
             for c in 0..2 {
                 pressure_norm += force[a][c] * force[a][c] * self.inverse_diagonal[node][c];
             }
         }
         let bu = divergence.apply(&u);
         let [mut penalty_norm, mut pressure_square, mut divergence_norm] = [0.0; 3];
+        let mut continued = 0.0;
         for q in 0..3 {
+            let penalty = self.matrices.cells[cell].penalty[q];
+            if penalty == 0.0 {
+                // A pressure that is given does work on the divergence.
+                continued += pressure[q] * divergence.of_given(q, &u);
+                share.divergence[q] = 0.0;
+                continue;
+            }
             let rp = bu[q] + compliance * mass[q] * pressure[q];
-            let needed = pressure[q] / self.matrices.cells[cell].penalty[q];
+            let needed = pressure[q] / penalty;
             penalty_norm += needed * needed / mass[q];
             pressure_square += mass[q] * pressure[q] * pressure[q];
             divergence_norm += rp * rp / mass[q];
@@ -141,8 +157,16 @@ impl<const D: usize> Stokes<D> {
         }
         share.force = force;
         let [strain, norms] = [internal.strain, divergence_norm];
-        share.sums =
-            [dissipation, strain, norms, taken, pressure_norm, penalty_norm, pressure_square];
+        share.sums = [
+            dissipation,
+            strain,
+            norms,
+            taken,
+            pressure_norm,
+            penalty_norm,
+            pressure_square,
+            continued,
+        ];
     }
 
     /// Returns the scaled residual, the relative divergence, the divergence that belongs to the
@@ -153,6 +177,7 @@ impl<const D: usize> Stokes<D> {
         load: &[[f64; D]],
         flow: &Flow<D>,
     ) -> (f64, f64, f64, f64) {
+        let relations = self.constraints.embedding();
         let [rr, ff, uu] = threads::sum(0..self.mesh.nodes(), |node| {
             let mut sums = [0.0; 3];
             for c in 0..D {
@@ -160,11 +185,16 @@ impl<const D: usize> Stokes<D> {
                 if d == 0.0 {
                     continue;
                 }
-                sums[2] += d * flow.velocity[node][c].powi(2);
+                let embedded = c < 2 && relations.is_some_and(|r| r.holds(node));
+                if !embedded {
+                    sums[2] += d * flow.velocity[node][c].powi(2);
+                }
                 if !self.constraints.is_fixed(node, c) {
                     let inverse = self.inverse_diagonal[node][c];
                     sums[0] += r.force[node][c].powi(2) * inverse;
-                    sums[1] += load[node][c].powi(2) * inverse;
+                    if !embedded {
+                        sums[1] += load[node][c].powi(2) * inverse;
+                    }
                 }
             }
             sums
@@ -185,16 +215,23 @@ impl<const D: usize> Stokes<D> {
 
     /// Power of the loads and of the reactions on moving boundaries.
     pub(super) fn power_in(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> f64 {
+        let relations = self.constraints.embedding();
         let [power] = threads::sum(0..self.mesh.nodes(), |node| {
             let (u, mut power) = (flow.velocity[node], 0.0);
             for c in 0..D {
                 power += load[node][c] * u[c];
-                if self.constraints.is_fixed(node, c) {
+                let embedded = c < 2 && relations.is_some_and(|r| r.holds(node));
+                if self.constraints.is_fixed(node, c) && !embedded {
                     power -= r.force[node][c] * u[c];
                 }
             }
             [power]
         });
-        power
+        let Some(relations) = relations else { return power };
+        let on_solids = relations.nodes().zip(&r.on_solids).map(|(node, force)| {
+            let u = flow.velocity[node];
+            force[0] * u[0] + force[1] * u[1]
+        });
+        power + r.continued - on_solids.sum::<f64>()
     }
 }

@@ -104,7 +104,7 @@ impl SofteningPoint {
         if *slope == 0.0 {
             return;
         }
-        let s = PointShape::new(self.place.shape(), cell.size);
+        let s = PointShape::new(&self.place.shape(), cell.size);
         let e = powers::<D>(&unit.stress(rates, 1.0), &s);
         // A stress that stiffens has no direction to be found.
         let (w, scale) = if *slope < 0.0 {

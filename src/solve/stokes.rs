@@ -46,6 +46,11 @@ use std::time::Instant;
 
 /// Relative tolerance of the balance of powers of a converged solution.
 const POWER_TOLERANCE: f64 = 1e-9;
+/// Change of the pressures that are continued into cells with solids, relative to the largest
+/// pressure, below which they are not continued again.
+const CONTINUED: f64 = 1e-6;
+/// Largest number of times that they are continued in a solution.
+const MOST_CONTINUATIONS: u32 = 20;
 /// Largest number of further corrections that reduce the error of the balance of powers.
 const POWER_CORRECTIONS: u32 = 3;
 
@@ -122,7 +127,8 @@ impl<const D: usize> Stokes<D> {
     ) -> Result<(), SolveError> {
         let &Given { quadrature, loads, stopping } = given;
         let load = loads.nodal;
-        let mut further = 0;
+        let (mut further, mut continued) = (0, 0);
+        flow.continue_slopes(&self.mesh, loads.weight);
         loop {
             self.residual(quadrature, loads, flow, work);
             let residual = &work.residual;
@@ -138,6 +144,14 @@ impl<const D: usize> Stokes<D> {
             let balanced = report.residual <= stopping.tolerance;
             let converged = balanced
                 && report.divergence <= stopping.tolerance * (1.0 + PRESSURE_SHARE * slack);
+            if converged && continued < MOST_CONTINUATIONS && self.mesh.parts().is_some() {
+                let change = flow.continue_slopes(&self.mesh, loads.weight);
+                if change > CONTINUED * flow.largest_pressure() {
+                    continued += 1;
+                    work.kept = 0;
+                    continue;
+                }
+            }
             if converged {
                 if further == POWER_CORRECTIONS || report.power_error() <= POWER_TOLERANCE {
                     return Ok(());

@@ -1,6 +1,7 @@
 //! This module defines the boundary conditions of the solver: prescribed nodal values, and the null
 //! spaces of the problem.
 
+use super::embedding::{self, Embedding};
 use super::flow::Flow;
 use super::mesh::Mesh;
 use super::shape::{GAUSS_3X3, NODES, SIDE_NODES, side_normal};
@@ -27,6 +28,8 @@ pub struct Constraints<const D: usize> {
     /// Point at which the pressure is given if it is determined only up to a constant; its mean is
     /// zero if no point is given.
     reference: Option<PressurePoint>,
+    /// Relations of the nodes of cells with solids of any shape.
+    embedding: Option<Box<Embedding>>,
 }
 
 /// A given pressure at a point.
@@ -47,7 +50,32 @@ impl<const D: usize> Constraints<D> {
             free_translation: [false; 2],
             closed: false,
             reference: None,
+            embedding: None,
         }
+    }
+
+    /// Adds the conditions on the solids of any shape in the mesh. Other conditions must be
+    /// prescribed before.
+    pub fn embed(&mut self, mesh: &Mesh) {
+        let Some(parts) = mesh.parts() else { return };
+        let relations = Embedding::new(mesh, parts, |node, c| self.fixed_value(node, c));
+        for (node, c) in embedding::aligned(mesh, parts, |node| relations.holds(node)) {
+            self.fix(node, c, 0.0);
+        }
+        for node in relations.nodes() {
+            for c in 0..2 {
+                let known = relations.known(node, c);
+                self.fixed[node][c] = known.is_some();
+                self.value[node][c] = known.unwrap_or(0.0);
+            }
+        }
+        self.embedding = Some(Box::new(relations));
+    }
+
+    /// The relations of the nodes of cells with solids of any shape, if there are any. Prescribed
+    /// values of such nodes are those of their unknowns.
+    pub fn embedding(&self) -> Option<&Embedding> {
+        self.embedding.as_deref()
     }
 
     /// Prescribes component `c` of a node, unless an earlier call has prescribed it.
@@ -96,12 +124,18 @@ impl<const D: usize> Constraints<D> {
 
     /// Sets the prescribed components to their values.
     pub fn impose(&self, velocity: &mut [[f64; D]]) {
-        for ((u, fixed), value) in velocity.iter_mut().zip(&self.fixed).zip(&self.value) {
-            for c in 0..D {
+        let relations = self.embedding.as_deref();
+        for (node, u) in velocity.iter_mut().enumerate() {
+            let (fixed, value) = (&self.fixed[node], &self.value[node]);
+            let first = if relations.is_some_and(|r| r.holds(node)) { 2 } else { 0 };
+            for c in first..D {
                 if fixed[c] {
                     u[c] = value[c];
                 }
             }
+        }
+        if let Some(relations) = relations {
+            relations.impose(velocity);
         }
     }
 

@@ -40,6 +40,32 @@ impl<const D: usize> Flow<D> {
         a + b * xi + c * eta
     }
 
+    /// Gives the pressure of cells with solids in them the slope of its neighbours, with the
+    /// difference of the weights per volume, by cell. Returns the largest change, as a difference of
+    /// pressures in a cell.
+    pub fn continue_slopes(&mut self, mesh: &Mesh, weight: &[[f64; 2]]) -> f64 {
+        let Some(parts) = mesh.parts() else { return 0.0 };
+        let weight = |cell: usize| weight.get(cell).copied().unwrap_or([0.0; 2]);
+        let mut largest = 0.0f64;
+        for (cell, part) in parts.all() {
+            let mut slope = [0.0; 2];
+            for &n in &part.beside {
+                let size = mesh.cell_size(n);
+                for c in 0..2 {
+                    let rest = 2.0 * self.pressure[n][1 + c] / size[c] - weight(n)[c];
+                    slope[c] += rest / part.beside.len() as f64;
+                }
+            }
+            let size = mesh.cell_size(cell);
+            for c in 0..2 {
+                let new = 0.5 * size[c] * (slope[c] + weight(cell)[c]);
+                largest = largest.max((new - self.pressure[cell][1 + c]).abs());
+                self.pressure[cell][1 + c] = new;
+            }
+        }
+        largest
+    }
+
     /// Extrapolates: adds `share` times the change since an earlier flow.
     pub fn extrapolate(&mut self, earlier: &Flow<D>, share: f64) {
         let go_on = |now: &mut f64, before: &f64| *now += share * (*now - before);
@@ -59,6 +85,11 @@ impl<const D: usize> Flow<D> {
     pub fn translation(&self, out: &mut Vec<[f64; 2]>) {
         out.clear();
         out.extend(self.velocity.iter().map(|u| [u[0], u[1]]));
+    }
+
+    /// Largest mean pressure of a cell.
+    pub fn largest_pressure(&self) -> f64 {
+        self.pressure.iter().map(|p| p[0].abs()).fold(0.0, f64::max)
     }
 
     /// Largest nodal speed.

@@ -50,6 +50,11 @@ pub struct CellMeasure {
 }
 
 impl CellMeasure {
+    /// Measure of a part of the cell.
+    pub fn part(self, fraction: f64) -> CellMeasure {
+        CellMeasure { depth: self.depth * fraction, ..self }
+    }
+
     /// Volume of the cell over its area.
     #[inline(always)]
     pub fn depth(&self) -> f64 {

@@ -2,6 +2,7 @@
 //! biquadratic element, and the cells.
 
 use super::measure::{CellMeasure, Measure};
+use super::parts::{Part, Parts, SharedParts};
 
 /// Distance from a mesh line, in cell sizes, below which a point counts as on the line. When the
 /// flow moves points along a line, rounding must not decide which of two cells contains them.
@@ -172,13 +173,15 @@ pub struct Mesh {
     /// Whether each cell is part of a solid block; such cells contain no material.
     pub solid: Vec<bool>,
     measure: Measure,
+    /// Solids of any shape and the free parts of the cells that they cut; `None` without solids.
+    pub(super) parts: SharedParts,
 }
 
 impl Mesh {
     /// A mesh without solid cells.
     pub fn new(x: Axis, y: Axis) -> Self {
         let solid = vec![false; x.cells() * y.cells()];
-        Mesh { x, y, solid, measure: Measure::PLANE }
+        Mesh { x, y, solid, measure: Measure::PLANE, parts: None }
     }
 
     /// Number of cells.
@@ -225,11 +228,34 @@ impl Mesh {
         let (i, j) = self.cell_ij(cell);
         [self.x.size(i), self.y.size(j)]
     }
-    /// Measure of a cell.
+    /// Measure of a cell, or of its part that solids leave free.
     pub fn cell_measure(&self, cell: usize) -> CellMeasure {
-        self.measure.of_cell(self.cell_size(cell))
+        let whole = self.measure.of_cell(self.cell_size(cell));
+        self.part(cell).map_or(whole, |part| whole.part(part.fraction))
     }
-    /// Volume of a cell (its area in the plane, per unit depth).
+    /// The solids of any shape, with the free parts of cells, if there are any.
+    pub fn parts(&self) -> Option<&Parts> {
+        self.parts.as_deref()
+    }
+    /// The parts, to be kept by others.
+    pub fn shared_parts(&self) -> SharedParts {
+        self.parts.clone()
+    }
+    /// The free part of a cell with a solid of any shape in it.
+    #[inline(always)]
+    pub fn part(&self, cell: usize) -> Option<&Part> {
+        self.parts.as_deref()?.of(cell)
+    }
+    /// Whether a point is inside of a solid.
+    pub fn is_solid_at(&self, p: [f64; 2]) -> bool {
+        self.is_solid_in(self.locate(p), p)
+    }
+    /// Whether a point of a cell is inside of a solid.
+    pub fn is_solid_in(&self, cell: usize, p: [f64; 2]) -> bool {
+        self.solid[cell]
+            || self.part(cell).is_some() && self.parts().is_some_and(|parts| parts.is_solid(p))
+    }
+    /// Volume of a cell (its area in the plane, per unit depth), without solids in it.
     pub fn cell_volume(&self, cell: usize) -> f64 {
         self.cell_measure(cell).volume()
     }

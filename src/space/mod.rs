@@ -3,6 +3,7 @@
 
 mod carried;
 pub mod constraints;
+pub mod embedding;
 pub mod fit;
 pub mod flow;
 pub mod incidence;
@@ -10,7 +11,9 @@ pub mod kink;
 pub mod measure;
 pub mod mesh;
 pub mod neighbours;
+pub mod outline;
 pub mod particles;
+pub mod parts;
 pub mod population;
 pub mod seeding;
 pub mod segment;

@@ -138,7 +138,7 @@ impl Population {
         for cell in (0..mesh.cells()).filter(|&c| lacking[c]) {
             members.clear();
             members.extend(particles.of_cell(cell));
-            let need = self.need(particles, cell);
+            let need = self.need(mesh, particles, cell);
             let nominal = mesh.cell_volume(cell) / self.target() as f64;
             loop {
                 let place = |&p: &usize| mesh.to_reference(cell, particles.position[p]);
@@ -191,7 +191,11 @@ impl Population {
     }
 
     /// Particles that a cell needs.
-    fn need(&self, particles: &Particles, cell: usize) -> Need {
+    fn need(&self, mesh: &Mesh, particles: &Particles, cell: usize) -> Need {
+        if let Some(part) = mesh.part(cell) {
+            let least = (part.fraction * self.target() as f64 / 2.0).ceil() as usize;
+            return Need { least, quadrants: false };
+        }
         let carries = particles.director.is_some()
             || particles.viscosity.is_some()
             || particles.density.is_some();
@@ -210,7 +214,7 @@ impl Population {
         // Most cells have enough by the largest need, which is known without their neighbours.
         !particles.of_cell(cell).is_empty()
             && falls_short(mesh, particles, cell, self.largest_need())
-            && falls_short(mesh, particles, cell, self.need(particles, cell))
+            && falls_short(mesh, particles, cell, self.need(mesh, particles, cell))
     }
 
     /// Position (reference coordinates) for a new particle: the centre of an empty quadrant, or, if
@@ -234,6 +238,7 @@ impl Population {
                 .map(|r| (r[0] - g[0]).powi(2) + (r[1] - g[1]).powi(2))
                 .fold(f64::INFINITY, f64::min)
         };
+        let lattice = lattice.filter(|g| !mesh.is_solid_in(cell, mesh.from_reference(cell, *g)));
         cheapest(
             lattice.map(|g| (-clearance(&g), from_middle(mesh, mesh.from_reference(cell, g)), g)),
         )
@@ -253,7 +258,10 @@ impl Population {
         particles.volume[donor] *= 0.5;
         particles.duplicate(donor);
         let child = particles.len() - 1;
-        particles.position[child] = mesh.cell_centre(cell);
+        particles.position[child] = match mesh.part(cell) {
+            Some(part) => mesh.free_place(cell, part),
+            None => mesh.cell_centre(cell),
+        };
         let (material, volume) = (particles.material[child], particles.volume[child]);
         Some(Refill { cells: [from, cell], material, volume })
     }
@@ -348,7 +356,10 @@ fn keep_centroid(
     for &p in kin {
         let [x, y] = particles.position[p];
         let r = mesh.to_reference(cell, [x + shift[0], y + shift[1]]);
-        particles.position[p] = mesh.from_reference(cell, r.map(|c| c.clamp(-INSIDE, INSIDE)));
+        let to = mesh.from_reference(cell, r.map(|c| c.clamp(-INSIDE, INSIDE)));
+        if mesh.part(cell).is_none() || !mesh.is_solid_at(to) {
+            particles.position[p] = to;
+        }
     }
 }
 

@@ -28,8 +28,20 @@ impl Seeding {
         Pcg64::seed_from_u64(self.seed ^ (cell as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
 
-    /// Positions of the particles in a cell.
+    /// Positions of the particles in a cell. Those inside of solids are left out; if all are, there is
+    /// one at the centroid of the part that is free.
     pub fn positions(&self, mesh: &Mesh, cell: usize, random: &mut Pcg64) -> Vec<[f64; 2]> {
+        let mut all = self.lattice(mesh, cell, random);
+        if let Some(part) = mesh.part(cell) {
+            all.retain(|&p| !mesh.is_solid_in(cell, p));
+            if all.is_empty() {
+                all.push(mesh.free_place(cell, part));
+            }
+        }
+        all
+    }
+
+    fn lattice(&self, mesh: &Mesh, cell: usize, random: &mut Pcg64) -> Vec<[f64; 2]> {
         let n = self.side as f64;
         (0..self.count())
             .map(|k| {

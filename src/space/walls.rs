@@ -2,6 +2,7 @@
 //! in the sides of the domain.
 
 use super::mesh::{Mesh, ON_LINE};
+use super::outline::slide;
 use super::segment::Segment;
 use super::shape::side_normal;
 
@@ -86,6 +87,11 @@ impl Enclosure {
             to[wall.normal] =
                 if p0[wall.normal] >= wall.at { wall.at } else { wall.below(mesh).next_down() };
             held = true;
+        }
+        if let Some(parts) = mesh.parts()
+            && let Some(end) = slide(parts.outlines(), p0, to)
+        {
+            (to, held) = (end, true);
         }
         if held { Landing::Held(to) } else { Landing::Free(to) }
     }

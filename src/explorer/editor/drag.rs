@@ -90,7 +90,8 @@ pub fn handles(scene: &Scene) -> Vec<Handle> {
         _ => None,
     });
     let blocks = scene.blocks.iter().enumerate();
-    let blocks = blocks.filter_map(|(k, b)| rectangle(Key::Blocks, k, &b.name, &b.x, &b.y));
+    let blocks = blocks
+        .filter_map(|(k, b)| rectangle(Key::Blocks, k, &b.name, b.x.as_ref()?, b.y.as_ref()?));
     let walls = scene.walls.iter().enumerate();
     let walls = walls.filter_map(|(k, w)| segment(Key::Walls, k, &w.name, &w.from, &w.to));
     let gauges = scene.gauges.iter().enumerate();

@@ -59,6 +59,14 @@ impl Surroundings {
                     let (c, r) = (point(centre, scope)?[self.vertical], radius.eval(scope)?);
                     [c - r, c + r]
                 }
+                Shape::Polygon(corners) => {
+                    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+                    for corner in corners {
+                        let c = point(corner, scope)?[self.vertical];
+                        range = [range[0].min(c), range[1].max(c)];
+                    }
+                    range
+                }
             };
             range = [range[0].min(low.max(bottom)), range[1].max(high.min(top))];
         }

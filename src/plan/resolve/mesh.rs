@@ -8,6 +8,7 @@ use crate::plan::boundary::{SIDES, Side, pieces, place_of};
 use crate::plan::meshing::{Line, Refinement, Sizing};
 use crate::scene::{BoundaryKind, GradingTarget, Scene, SceneError, Scope, WallKind};
 use crate::space::mesh::{Axis, Mesh};
+use crate::space::parts::Solid;
 use crate::space::segment::Segment;
 use crate::space::shape::side_normal;
 
@@ -60,9 +61,9 @@ pub(super) fn mesh(
         let owner = format!("wall `{}`", w.name);
         w.segment.lines().into_iter().for_each(|(c, v)| demand(c, v, &owner, false));
     }
-    for (b, s) in walls.blocks.iter().zip(&scene.blocks) {
+    for b in &walls.blocks {
         for c in 0..2 {
-            b.0[c].iter().for_each(|&v| demand(c, v, &format!("block `{}`", s.name), false));
+            b.range[c].iter().for_each(|&v| demand(c, v, &format!("block `{}`", b.name), false));
         }
     }
     for g in gauges {
@@ -157,9 +158,15 @@ pub(super) fn mesh(
     let mut mesh = Mesh::new(x, y);
     for cell in 0..mesh.cells() {
         let [px, py] = mesh.cell_centre(cell).map(|v| v * units.length);
-        mesh.solid[cell] =
-            walls.blocks.iter().any(|([x, y], _)| px > x[0] && px < x[1] && py > y[0] && py < y[1]);
+        let covers = |[x, y]: [[f64; 2]; 2]| px > x[0] && px < x[1] && py > y[0] && py < y[1];
+        mesh.solid[cell] = walls.blocks.iter().any(|b| covers(b.range));
     }
+    let solids = walls.solids.iter().map(|s| Solid {
+        name: s.name.clone(),
+        outline: s.outline.in_units(units.length),
+        no_slip: s.kind == WallKind::NoSlip,
+    });
+    let mesh = mesh.with_solids(solids.collect());
     if mesh.solid.iter().all(|&s| s) {
         return Err(SceneError::of_key(
             "blocks",

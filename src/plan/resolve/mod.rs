@@ -8,6 +8,7 @@ mod gauges;
 mod materials;
 mod mesh;
 mod null_spaces;
+mod outlines;
 mod pressure;
 mod recording;
 mod regions;

@@ -2,6 +2,7 @@
 //! start.
 
 use super::materials::{SiMatter, material_index};
+use super::outlines;
 use super::values::{Result, finite_range, point, positive, ranges};
 use crate::plan::{Area, InitialDirector, Region, Warning};
 use crate::scene::{self, Scene, SceneError, Scope, Shape};
@@ -60,6 +61,11 @@ pub(super) fn regions(
                     }
                 }
                 Area::Circle { centre: c, radius: radius_m }
+            }
+            Shape::Polygon(corners) => {
+                let outline = outlines::polygon(corners, &format!("{what}.shape"), scope)?;
+                outlines::touches(&outline, domain, &corners[0][0], &what)?;
+                Area::Polygon(outline)
             }
             Shape::Where(f) => {
                 let compiled = f.compile(scope)?;

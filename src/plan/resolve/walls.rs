@@ -1,18 +1,37 @@
 //! This module resolves `[[walls]]` and `[[blocks]]` into obstacles along mesh lines, and finds the
 //! edges (lips) of apertures.
 
-use super::values::{Result, point, ranges};
+use super::outlines;
+use super::values::{Result, point, positive, ranges};
 use crate::plan::{BoundaryPlan, Units};
-use crate::scene::{Quantity, Scene, SceneError, Scope, WallKind};
+use crate::scene::{Block, Quantity, Scene, SceneError, Scope, Shape, Wall, WallKind};
 use crate::space::mesh::Mesh;
+use crate::space::outline::Outline;
 use crate::space::segment::Segment;
 use crate::space::walls::Enclosure;
 
 /// Walls and blocks in SI coordinates.
 pub(in crate::plan) struct Walls {
     pub(in crate::plan) walls: Vec<SiWall>,
-    /// Ranges along x and y (m) and kind of each block.
-    pub(in crate::plan) blocks: Vec<([[f64; 2]; 2], WallKind)>,
+    /// Blocks along mesh lines.
+    pub(in crate::plan) blocks: Vec<SiBlock>,
+    /// Solids of any shape.
+    pub(in crate::plan) solids: Vec<SiSolid>,
+}
+
+/// A block along mesh lines in SI coordinates.
+pub(in crate::plan) struct SiBlock {
+    pub(in crate::plan) name: String,
+    /// Ranges along x and y, m.
+    pub(in crate::plan) range: [[f64; 2]; 2],
+    pub(in crate::plan) kind: WallKind,
+}
+
+/// A solid of any shape in SI coordinates.
+pub(in crate::plan) struct SiSolid {
+    pub(in crate::plan) name: String,
+    pub(in crate::plan) outline: Outline,
+    pub(in crate::plan) kind: WallKind,
 }
 
 /// A wall in SI coordinates.
@@ -50,7 +69,8 @@ pub(in crate::plan) fn axis_segment(
         return Err(SceneError::at(
             &to[0],
             format!("{what} is slanted: from ({}, {}) to ({}, {})", a[0], a[1], b[0], b[1]),
-            "walls and gauges follow mesh lines: make both x or both y equal",
+            "make both x or both y equal; a wall may also be slanted with a thickness, as in \
+             thickness = 0.05",
         ));
     }
     if dx <= tiny && dy <= tiny {
@@ -73,7 +93,15 @@ impl Walls {
     ) -> Result<Walls> {
         let mut errors = Vec::new();
         let mut walls = Vec::new();
+        let mut solids = Vec::new();
         for w in &scene.walls {
+            if let Some(thickness) = &w.thickness {
+                match thick(w, thickness, scope, domain) {
+                    Ok(solid) => solids.push(solid),
+                    Err(e) => errors.push(e),
+                }
+                continue;
+            }
             let rotation = w.rotation.as_ref().map(|q| q.eval(scope)).transpose();
             match (
                 axis_segment(&format!("wall `{}`", w.name), &w.from, &w.to, scope, domain),
@@ -87,20 +115,14 @@ impl Walls {
         }
         let mut blocks = Vec::new();
         for b in &scene.blocks {
-            let [bx, by] = ranges(&b.x, &b.y, scope)?;
-            for (c, r) in [bx, by].into_iter().enumerate() {
-                if r[0] >= r[1] || r[0] < domain[c][0] || r[1] > domain[c][1] {
-                    errors.push(SceneError::at(
-                        if c == 0 { &b.x[0] } else { &b.y[0] },
-                        format!("block `{}` is empty or reaches outside the domain", b.name),
-                        "give [low, high] inside the domain",
-                    ));
-                }
+            match resolved(b, scope, domain) {
+                Ok(Resolved::Aligned(block)) => blocks.push(block),
+                Ok(Resolved::Solid(solid)) => solids.push(solid),
+                Err(e) => errors.push(e),
             }
-            blocks.push(([bx, by], b.kind));
         }
         SceneError::join(errors)?;
-        Ok(Walls { walls, blocks })
+        Ok(Walls { walls, blocks, solids })
     }
 
     /// The lips of apertures: ends of walls that face each other across a gap. (Additional grading
@@ -146,7 +168,7 @@ impl Walls {
         let l = units.length;
         let mut obstacles: Vec<Segment> =
             self.walls.iter().map(|w| w.segment.on_mesh(mesh, l)).collect();
-        for (range, _) in &self.blocks {
+        for SiBlock { range, .. } in &self.blocks {
             for normal in 0..2 {
                 for at in range[normal] {
                     let [from, to] = range[1 - normal].map(|v| v / l);
@@ -160,6 +182,80 @@ impl Walls {
         }
         enclosure
     }
+}
+
+/// A resolved block.
+enum Resolved {
+    Aligned(SiBlock),
+    Solid(SiSolid),
+}
+
+fn resolved(b: &Block, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Resolved> {
+    let what = format!("block `{}`", b.name);
+    let (name, kind) = (b.name.clone(), b.kind);
+    let solid = |outline, place: &Quantity| {
+        outlines::touches(&outline, domain, place, &what)?;
+        Ok(Resolved::Solid(SiSolid { name: name.clone(), outline, kind }))
+    };
+    let (x, y) = match (&b.x, &b.y, &b.shape) {
+        (Some(x), Some(y), None) | (None, None, Some(Shape::Rectangle { x, y })) => (x, y),
+        (None, None, Some(Shape::Polygon(corners))) => {
+            let outline = outlines::polygon(corners, &what, scope)?;
+            return solid(outline, &corners[0][0]);
+        }
+        (None, None, Some(Shape::Circle { centre, radius })) => {
+            return solid(outlines::circle(centre, radius, &what, scope)?, &centre[0]);
+        }
+        (None, None, Some(Shape::Everywhere | Shape::Where(_))) => {
+            return Err(SceneError::of_key(
+                "blocks",
+                format!("the shape of {what} is neither a rectangle, a polygon nor a circle"),
+                "give shape.polygon = [[x, y], ...] or shape.circle = { centre, radius }",
+            ));
+        }
+        _ => {
+            return Err(SceneError::of_key(
+                "blocks",
+                format!("{what} needs either x and y or a shape"),
+                "give x = [low, high] and y = [low, high], or shape.polygon, or shape.circle",
+            ));
+        }
+    };
+    let range = ranges(x, y, scope)?;
+    for (c, r) in range.into_iter().enumerate() {
+        if r[0] >= r[1] || r[0] < domain[c][0] || r[1] > domain[c][1] {
+            return Err(SceneError::at(
+                if c == 0 { &x[0] } else { &y[0] },
+                format!("{what} is empty or reaches outside the domain"),
+                "give [low, high] inside the domain",
+            ));
+        }
+    }
+    Ok(Resolved::Aligned(SiBlock { name, range, kind }))
+}
+
+/// A wall with a thickness.
+fn thick(w: &Wall, thickness: &Quantity, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<SiSolid> {
+    let what = format!("wall `{}`", w.name);
+    if let Some(rotation) = &w.rotation {
+        return Err(SceneError::at(
+            rotation,
+            format!("{what} has a thickness and a rotation"),
+            "the rotation is free on walls with a thickness: remove `rotation`",
+        ));
+    }
+    let (from, to) = (point(&w.from, scope)?, point(&w.to, scope)?);
+    if from == to {
+        return Err(SceneError::at(
+            &w.to[0],
+            format!("{what} has no length"),
+            "`from` and `to` must differ in x or in y",
+        ));
+    }
+    let thickness = positive(thickness, scope, &format!("{what}: thickness"))?;
+    let outline = outlines::around(from, to, thickness);
+    outlines::touches(&outline, domain, &w.from[0], &what)?;
+    Ok(SiSolid { name: w.name.clone(), outline, kind: w.kind })
 }
 
 /// A free end of a wall.

@@ -1,0 +1,318 @@
+//! This module makes the velocity of cells with a solid of any shape in them vanish on its outline.
+//!
+//! Along a wall the velocity is a product `u = d q` of the distance `d` from the wall and a smooth
+//! function. In cells that a solid cuts, `q` is bilinear and the velocity the biquadratic function
+//! with the nodal values of the product:
+//!
+//! ```text
+//! corner k     u_k = d_k q_k
+//! other node   u_a = d_a mean of q over the corners beside it
+//! ```
+//! On a straight wall this velocity is exactly zero, and since `d` is of the size of a cell where `q`
+//! is approximated, it is of third order. Corners inside of the solid count too: `q` is continued
+//! there. Along walls that slip this holds for the normal component; the nodes keep their tangential
+//! velocity. All conditions are linear relations of the nodes of one cell, so matrices stay positive
+//! definite and are assembled cell by cell, and no cell is too small: the flow depends on `q`, not on
+//! the volume that is left of a cell.
+//!
+//! Each cell with a solid in it has a constant pressure; with a linear one it would have more
+//! conditions than velocities. Measured: drag of a square array of cylinders (Sangani and Acrivos
+//! 1982) at 32 cells, fractions 0.2 and 0.4: 0.1 % off with a constant, 0.4 and 2.3 % with a linear
+//! pressure.
+
+use super::mesh::Mesh;
+use super::outline::Point;
+use super::parts::{Parts, Solid};
+use super::shape::NODES;
+
+/// Distance, in cells, below which a node is on an outline.
+const ON_OUTLINE: f64 = 1e-9;
+
+/// Distance, in cells, below which the unknown of a corner is not computed from its velocity.
+const NEAR: f64 = 1e-6;
+
+/// Smallest cosine of the angle between two normals in a cell with a straight wall. Where the
+/// normals differ by more, the cell has a corner of a solid, and walls that slip do not slip.
+const STRAIGHT: f64 = 0.8;
+
+/// Corners beside each node of a cell that is not a corner.
+const BESIDE: [&[usize]; NODES] =
+    [&[], &[0, 2], &[], &[0, 6], &[0, 2, 6, 8], &[2, 8], &[], &[6, 8], &[]];
+
+/// Matrix of a linear map of two components.
+type Map = [[f64; 2]; 2];
+
+/// Matrix from the unknowns of the nodes of a cell to their velocities, `9 c + a` for component `c`
+/// of node `a`.
+pub type CellMap = [[f64; 2 * NODES]; 2 * NODES];
+
+/// A node with relations: its velocity is the sum of `map q_k` over the unknowns of some nodes `k`.
+#[derive(Clone, Debug)]
+struct Node {
+    node: u32,
+    terms: Vec<(u32, Map)>,
+    /// Components of its own unknown that no term depends on.
+    idle: [bool; 2],
+    /// Prescribed values of its own unknown.
+    given: [Option<f64>; 2],
+}
+
+/// Relations of the nodes of cells with solids.
+#[derive(Clone, Debug)]
+pub struct Embedding {
+    nodes: Vec<Node>,
+    /// Index in `nodes` of each node of the mesh, or `NONE`.
+    index: Vec<u32>,
+    /// Map of each cell with such a node.
+    cells: Vec<Option<Box<CellMap>>>,
+}
+
+const NONE: u32 = u32::MAX;
+const IDENTITY: Map = [[1.0, 0.0], [0.0, 1.0]];
+
+/// What is known of a node before its relations.
+struct Site {
+    /// Distance from the nearest solid, in cells.
+    distance: f64,
+    normal: Point,
+    no_slip: bool,
+    /// Corners beside it, for nodes that are not corners.
+    beside: Vec<usize>,
+    /// Whether a solid is lost between the nodes of its cell.
+    at_rest: bool,
+}
+
+impl Embedding {
+    /// The relations of the nodes of a mesh; `given(node, c)` is the velocity that other boundary
+    /// conditions prescribe.
+    pub fn new(mesh: &Mesh, parts: &Parts, given: impl Fn(usize, usize) -> Option<f64>) -> Self {
+        let scale = unit(mesh);
+        let mut sites: Vec<Option<Site>> = (0..mesh.nodes()).map(|_| None).collect();
+        for (cell, part) in parts.all() {
+            let nodes = mesh.cell_nodes(cell);
+            let near = |a: usize| {
+                let r = [(a % 3) as f64 - 1.0, (a / 3) as f64 - 1.0];
+                let p = mesh.from_reference(cell, r);
+                parts.nearest(p).map(|(solid, d)| (solid, d, solid.outline.normal(p)))
+            };
+            let found: Vec<(&Solid, f64, Point)> = (0..NODES).filter_map(near).collect();
+            let all_pairs = || found.iter().flat_map(|a| found.iter().map(move |b| (a.2, b.2)));
+            let straight = all_pairs().all(|(a, b)| a[0] * b[0] + a[1] * b[1] > STRAIGHT);
+            for (a, (solid, distance, normal)) in found.into_iter().enumerate() {
+                let sticks = solid.no_slip || !straight;
+                let site = sites[nodes[a]].get_or_insert_with(|| Site {
+                    distance: distance / scale,
+                    normal,
+                    no_slip: sticks,
+                    beside: BESIDE[a].iter().map(|&b| nodes[b]).collect(),
+                    at_rest: part.unresolved,
+                });
+                site.no_slip |= sticks;
+                site.at_rest |= part.unresolved;
+            }
+        }
+        let mut out = Embedding { nodes: vec![], index: vec![NONE; mesh.nodes()], cells: vec![] };
+        for (node, site) in sites.iter().enumerate() {
+            let Some(site) = site else { continue };
+            let given = [0, 1].map(|c| given(node, c));
+            out.index[node] = out.nodes.len() as u32;
+            out.nodes.push(relation(node, site, &sites, given));
+        }
+        out.cells = (0..mesh.cells()).map(|cell| out.map_of(mesh, cell)).collect();
+        out
+    }
+
+    fn node(&self, node: usize) -> Option<&Node> {
+        self.nodes.get(self.index[node] as usize)
+    }
+
+    /// Whether a node has relations.
+    pub fn holds(&self, node: usize) -> bool {
+        self.index[node] != NONE
+    }
+
+    /// Whether component `c` of the unknown of a node is not solved for, and its value.
+    pub fn known(&self, node: usize, c: usize) -> Option<f64> {
+        let n = self.node(node)?;
+        if n.idle[c] { Some(0.0) } else { n.given[c] }
+    }
+
+    /// The nodes with relations.
+    pub fn nodes(&self) -> impl Iterator<Item = usize> + '_ {
+        self.nodes.iter().map(|n| n.node as usize)
+    }
+
+    /// Map of a cell from its unknowns to its velocities; `None` if they are the same.
+    pub fn of_cell(&self, cell: usize) -> Option<&CellMap> {
+        self.cells[cell].as_deref()
+    }
+
+    fn map_of(&self, mesh: &Mesh, cell: usize) -> Option<Box<CellMap>> {
+        let nodes = mesh.cell_nodes(cell);
+        if mesh.solid[cell] || !nodes.iter().any(|&n| self.holds(n)) {
+            return None;
+        }
+        let mut map = Box::new([[0.0; 2 * NODES]; 2 * NODES]);
+        for (a, &node) in nodes.iter().enumerate() {
+            let own = [(node as u32, IDENTITY)];
+            let terms = self.node(node).map_or(&own[..], |n| &n.terms[..]);
+            for (k, m) in terms {
+                let Some(b) = nodes.iter().position(|n| n == &(*k as usize)) else { continue };
+                for c in 0..2 {
+                    for d in 0..2 {
+                        map[NODES * c + a][NODES * d + b] += m[c][d];
+                    }
+                }
+            }
+        }
+        Some(map)
+    }
+
+    /// Replaces the unknowns of the nodes with relations by their velocities.
+    pub fn expand<const D: usize>(&self, velocity: &mut [[f64; D]]) {
+        let unknown = |n: u32| [0, 1].map(|c| velocity[n as usize][c]);
+        let expanded: Vec<[f64; 2]> = self
+            .nodes
+            .iter()
+            .map(|n| {
+                let mut u = [0.0; 2];
+                for (k, m) in &n.terms {
+                    let q = unknown(*k);
+                    for c in 0..2 {
+                        u[c] += m[c][0] * q[0] + m[c][1] * q[1];
+                    }
+                }
+                u
+            })
+            .collect();
+        for (n, u) in self.nodes.iter().zip(expanded) {
+            velocity[n.node as usize][..2].copy_from_slice(&u);
+        }
+    }
+
+    /// Replaces the forces on the velocities of the nodes with relations by those on their unknowns.
+    pub fn reduce<const D: usize>(&self, force: &mut [[f64; D]]) {
+        let before: Vec<[f64; 2]> =
+            self.nodes.iter().map(|n| [0, 1].map(|c| force[n.node as usize][c])).collect();
+        self.nodes.iter().for_each(|n| force[n.node as usize][..2].fill(0.0));
+        for (n, f) in self.nodes.iter().zip(before) {
+            for (k, m) in &n.terms {
+                for c in 0..2 {
+                    force[*k as usize][c] += m[0][c] * f[0] + m[1][c] * f[1];
+                }
+            }
+        }
+    }
+
+    /// Makes a velocity satisfy the relations; where it does, it does not change.
+    pub fn impose<const D: usize>(&self, velocity: &mut [[f64; D]]) {
+        for n in &self.nodes {
+            let u = &mut velocity[n.node as usize];
+            let q = n.unknown([u[0], u[1]]);
+            u[..2].copy_from_slice(&q);
+        }
+        self.expand(velocity);
+    }
+}
+
+impl Node {
+    /// The unknown of the node for its velocity.
+    fn unknown(&self, u: [f64; 2]) -> [f64; 2] {
+        let own = self.terms.iter().find(|(k, _)| *k == self.node);
+        let Some((_, m)) = own else { return [0.0; 2] };
+        // The columns of the map are orthogonal.
+        [0, 1].map(|c| {
+            let square = m[0][c] * m[0][c] + m[1][c] * m[1][c];
+            match (self.idle[c], self.given[c]) {
+                (true, _) => 0.0,
+                (_, Some(q)) => q,
+                _ if square <= NEAR * NEAR => 0.0,
+                _ => (m[0][c] * u[0] + m[1][c] * u[1]) / square,
+            }
+        })
+    }
+}
+
+/// Unit of the distances: the mean size of the cells.
+fn unit(mesh: &Mesh) -> f64 {
+    let size = |n: f64, length: f64| length / n;
+    0.5 * (size(mesh.x.cells() as f64, mesh.x.length())
+        + size(mesh.y.cells() as f64, mesh.y.length()))
+}
+
+/// The relation of a node.
+fn relation(node: usize, site: &Site, sites: &[Option<Site>], given: [Option<f64>; 2]) -> Node {
+    let own = node as u32;
+    let mut out = Node { node: own, terms: vec![], idle: [true; 2], given: [None; 2] };
+    if site.at_rest {
+        return out;
+    }
+    let (d, n) = (site.distance, site.normal);
+    let along = [-n[1], n[0]];
+    if site.beside.is_empty() {
+        out.idle = [false; 2];
+        if site.no_slip {
+            out.terms.push((own, [[d, 0.0], [0.0, d]]));
+            let value = |u: f64| if d.abs() > NEAR { u / d } else { 0.0 };
+            out.given = given.map(|u| u.map(value));
+        } else if let Some(c) = (0..2).find(|&c| given[c].is_some()) {
+            // The component that a side of the domain leaves free is normal to the wall in part.
+            let mut map = [[0.0; 2]; 2];
+            map[1 - c][1 - c] = d;
+            out.terms.push((own, map));
+            out.idle[c] = true;
+            out.given[1 - c] = given[1 - c].map(|_| 0.0);
+        } else {
+            out.terms.push((own, [[along[0], n[0] * d], [along[1], n[1] * d]]));
+        }
+        return out;
+    }
+    let share = d / site.beside.len() as f64;
+    for &corner in &site.beside {
+        let Some(at) = &sites[corner] else { continue };
+        let m = at.normal;
+        let map = match (site.no_slip, at.no_slip) {
+            (true, true) => [[share, 0.0], [0.0, share]],
+            // Of a corner that slips, only the normal component is known to vanish.
+            (true, false) => [[0.0, share * m[0]], [0.0, share * m[1]]],
+            (false, true) => [0, 1].map(|c| [share * n[c] * n[0], share * n[c] * n[1]]),
+            (false, false) => {
+                let cosine = n[0] * m[0] + n[1] * m[1];
+                [[0.0, share * n[0] * cosine], [0.0, share * n[1] * cosine]]
+            }
+        };
+        out.terms.push((corner as u32, map));
+    }
+    let held = (0..2).any(|c| given[c].is_some() && along[c].abs() > NEAR);
+    if !site.no_slip && !held {
+        out.terms.push((own, [[along[0], 0.0], [along[1], 0.0]]));
+        out.idle[0] = false;
+    }
+    out
+}
+
+/// Components of the velocity of nodes on outlines along mesh lines that are zero: nodes of free cells
+/// without a part, with the component.
+pub fn aligned(mesh: &Mesh, parts: &Parts, holds: impl Fn(usize) -> bool) -> Vec<(usize, usize)> {
+    let scale = unit(mesh);
+    let mut out = Vec::new();
+    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c] && mesh.part(c).is_none()) {
+        for node in mesh.cell_nodes(cell) {
+            let p = mesh.node_position(node);
+            if holds(node) {
+                continue;
+            }
+            let Some((solid, d)) = parts.nearest(p) else { continue };
+            if d > ON_OUTLINE * scale {
+                continue;
+            }
+            let n = solid.outline.normal(p);
+            for c in 0..2 {
+                if solid.no_slip || n[c].abs() > 0.5 {
+                    out.push((node, c));
+                }
+            }
+        }
+    }
+    out
+}
