@@ -13,6 +13,7 @@ pub mod rayleigh_taylor;
 mod reference;
 mod small;
 mod solcx;
+pub mod solids;
 mod solkz;
 mod solvi;
 mod vortex;

@@ -7,6 +7,7 @@ use crate::simd::Simd;
 use crate::space::kink::Kink;
 use crate::space::mesh::{Axis, INSIDE, Mesh, Span};
 use crate::space::shape::NODES;
+use crate::space::stream::StreamFlow;
 use crate::space::walls::{Enclosure, Landing};
 use crate::threads;
 use nalgebra::Matrix2;
@@ -19,6 +20,8 @@ pub struct CellVelocities {
     cells: Vec<CellVelocity>,
     /// Part of the velocity of each cell that has a kink; empty if no velocity of the run has one.
     edges: Vec<Option<Edge>>,
+    /// Velocity of each cell with a solid of any shape in it; empty without solids.
+    streams: Vec<Option<StreamFlow>>,
     /// Whether no wall, side of the domain or periodic seam lies between the points of the 3 x 3
     /// cells around the cell.
     free: Vec<bool>,
@@ -29,7 +32,8 @@ impl CellVelocities {
     pub fn new(mesh: &Mesh, enclosure: &Enclosure, kinked: bool) -> Self {
         let free = (0..mesh.cells()).map(|cell| is_free(mesh, enclosure, cell)).collect();
         let edges = if kinked { vec![None; mesh.cells()] } else { Vec::new() };
-        CellVelocities { cells: vec![CellVelocity::default(); mesh.cells()], edges, free }
+        let streams = vec![None; if mesh.parts().is_some() { mesh.cells() } else { 0 }];
+        CellVelocities { cells: vec![CellVelocity::default(); mesh.cells()], edges, streams, free }
     }
 }
 
@@ -72,6 +76,7 @@ pub struct FrozenFlow<'a> {
     /// Velocity of every cell at the middle of the step.
     velocities: &'a [CellVelocity],
     edges: &'a [Option<Edge>],
+    streams: &'a [Option<StreamFlow>],
     free: &'a [bool],
     simd: Simd,
 }
@@ -144,11 +149,15 @@ impl<'a> FrozenFlow<'a> {
         kinks: &Kinks,
         dt: f64,
     ) -> Self {
-        let CellVelocities { cells, edges, free } = velocities;
+        let CellVelocities { cells, edges, streams, free } = velocities;
         let of_nodes = |cell| mesh.cell_nodes(cell).map(|n| velocity[n]);
         threads::for_each(edges, CELL_GRAIN, |cell, edge| {
             *edge = kinks(cell, &of_nodes(cell))
                 .map(|(kink, amplitude)| Edge { kink, jump: kink.along.map(|t| t * amplitude) });
+        });
+        threads::for_each(streams, CELL_GRAIN, |cell, stream| {
+            let of = mesh.part(cell).and_then(|part| part.stream.as_ref());
+            *stream = of.map(|s| s.flow(&of_nodes(cell)));
         });
         threads::for_each(cells, CELL_GRAIN, |cell, current| {
             let mut nodal = of_nodes(cell);
@@ -164,7 +173,7 @@ impl<'a> FrozenFlow<'a> {
             };
         });
         let simd = Simd::used();
-        FrozenFlow { mesh, enclosure, dt, velocities: cells, edges, free, simd }
+        FrozenFlow { mesh, enclosure, dt, velocities: cells, edges, streams, free, simd }
     }
 
     /// Part of the velocity of a cell that has a kink, if there is one.
@@ -174,10 +183,22 @@ impl<'a> FrozenFlow<'a> {
 
     /// Velocity at a cell and reference coordinates.
     fn velocity(&self, cell: usize, r: [f64; 2]) -> [f64; 2] {
+        if let Some(u) = self.beside_solid(cell, r) {
+            return u;
+        }
         let u = self.velocities[cell].at(r);
         let Some(Edge { kink, jump }) = self.edge(cell) else { return u };
         let psi = kink.edge(r);
         [u[0] + psi * jump[0], u[1] + psi * jump[1]]
+    }
+
+    /// Velocity in a cell with a solid of any shape in it, if it has a streamfunction.
+    fn beside_solid(&self, cell: usize, r: [f64; 2]) -> Option<[f64; 2]> {
+        let flow = self.streams.get(cell)?.as_ref()?;
+        let p = self.mesh.from_reference(cell, r);
+        let (solid, d) = self.mesh.parts()?.nearest(p)?;
+        let stream = self.mesh.part(cell)?.stream.as_ref()?;
+        Some(stream.velocity(flow, p, d, solid.outline.normal(p)))
     }
 
     /// The start cell with an index.

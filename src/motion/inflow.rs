@@ -111,6 +111,10 @@ impl Inflow {
         };
         // A step crosses at most a cell; a longer way would end in another cell.
         let inside = (0.5 * depth).min(0.5);
+        // Nothing enters through what a solid covers.
+        if [0.0, inside].iter().any(|&t| mesh.is_solid_in(cell, point(t))) {
+            return None;
+        }
         Some(Entry { cell, volume, at: point(inside), from: point(-inside) })
     }
 

@@ -34,7 +34,7 @@ fn first_bad(values: &[f64]) -> Option<(usize, f64)> {
 /// Whether a point is in the domain.
 fn inside(mesh: &Mesh, p: [f64; 2]) -> bool {
     let within = |v: f64, axis: &crate::space::mesh::Axis| v >= axis.start() && v <= axis.end();
-    within(p[0], &mesh.x) && within(p[1], &mesh.y)
+    within(p[0], &mesh.x) && within(p[1], &mesh.y) && !mesh.is_solid_at(p)
 }
 
 impl<const D: usize> Simulation<D> {

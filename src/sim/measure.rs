@@ -149,7 +149,9 @@ impl<const D: usize> Simulation<D> {
                 return [0.0; 2];
             }
             let volume: f64 = self.particles.volume[range].iter().sum();
-            [(volume / mesh.cell_volume(cell) - 1.0).powi(2), 1.0]
+            // In a sliver beside a solid, one particle more or less is much of it, but not of a cell.
+            let part = mesh.part(cell).map_or(1.0, |part| part.fraction);
+            [(part * (volume / mesh.cell_volume(cell) - 1.0)).powi(2), 1.0]
         });
         (sum / cells.max(1.0)).sqrt()
     }

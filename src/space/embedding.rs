@@ -31,6 +31,9 @@ const ON_OUTLINE: f64 = 1e-9;
 /// Distance, in cells, below which the unknown of a corner is not computed from its velocity.
 const NEAR: f64 = 1e-6;
 
+/// Smallest component of the direction of a wall from which the velocity along it is computed.
+const OBLIQUE: f64 = 0.3;
+
 /// Smallest cosine of the angle between two normals in a cell with a straight wall. Where the
 /// normals differ by more, the cell has a corner of a solid, and walls that slip do not slip.
 const STRAIGHT: f64 = 0.8;
@@ -249,21 +252,27 @@ fn relation(node: usize, site: &Site, sites: &[Option<Site>], given: [Option<f64
     }
     let (d, n) = (site.distance, site.normal);
     let along = [-n[1], n[0]];
+    let held = (0..2).find(|&c| given[c].is_some());
     if site.beside.is_empty() {
         out.idle = [false; 2];
         if site.no_slip {
             out.terms.push((own, [[d, 0.0], [0.0, d]]));
             let value = |u: f64| if d.abs() > NEAR { u / d } else { 0.0 };
             out.given = given.map(|u| u.map(value));
-        } else if let Some(c) = (0..2).find(|&c| given[c].is_some()) {
+        } else if let (Some(c), true) = (held, given.iter().flatten().all(|&u| u == 0.0)) {
             // The component that a side of the domain leaves free is normal to the wall in part.
             let mut map = [[0.0; 2]; 2];
             map[1 - c][1 - c] = d;
             out.terms.push((own, map));
             out.idle[c] = true;
-            out.given[1 - c] = given[1 - c].map(|_| 0.0);
+            out.given[1 - c] = given[1 - c];
         } else {
             out.terms.push((own, [[along[0], n[0] * d], [along[1], n[1] * d]]));
+            if held.is_some() {
+                let normal = given[0].zip(given[1]).map_or(0.0, |(u, v)| u * n[0] + v * n[1]);
+                let amplitude = if d.abs() > NEAR { normal / d } else { 0.0 };
+                out.given = [Some(tangential(given, along)), Some(amplitude)];
+            }
         }
         return out;
     }
@@ -283,12 +292,23 @@ fn relation(node: usize, site: &Site, sites: &[Option<Site>], given: [Option<f64
         };
         out.terms.push((corner as u32, map));
     }
-    let held = (0..2).any(|c| given[c].is_some() && along[c].abs() > NEAR);
-    if !site.no_slip && !held {
+    if !site.no_slip {
         out.terms.push((own, [[along[0], 0.0], [along[1], 0.0]]));
         out.idle[0] = false;
+        let held = (0..2).any(|c| given[c].is_some() && along[c].abs() > NEAR);
+        out.given[0] = held.then(|| tangential(given, along));
     }
     out
+}
+
+/// Velocity along a wall of which some components are given.
+fn tangential(given: [Option<f64>; 2], along: Point) -> f64 {
+    match given {
+        [Some(u), Some(v)] => u * along[0] + v * along[1],
+        [Some(u), None] if along[0].abs() > OBLIQUE => u / along[0],
+        [None, Some(v)] if along[1].abs() > OBLIQUE => v / along[1],
+        _ => 0.0,
+    }
 }
 
 /// Components of the velocity of nodes on outlines along mesh lines that are zero: nodes of free cells

@@ -18,4 +18,5 @@ pub mod population;
 pub mod seeding;
 pub mod segment;
 pub mod shape;
+pub mod stream;
 pub mod walls;

@@ -10,6 +10,7 @@ use super::measure::CellMeasure;
 use super::mesh::Mesh;
 use super::outline::{Outline, Point};
 use super::shape::{NODES, SIDE_NODES, Shape, side_normal};
+use super::stream::Stream;
 use std::sync::Arc;
 
 /// Number of squares along a cell that its outline is found with.
@@ -68,6 +69,8 @@ pub struct Part {
     pub divergence: [[[f64; NODES]; 2]; 3],
     /// Neighbours without solids, whose pressure has the slope of this one.
     pub beside: Vec<usize>,
+    /// Streamfunction of the velocity in it, where a single wall crosses the cell.
+    pub stream: Option<Box<Stream>>,
     /// Whether a solid in the cell is thinner than its nodes can show; the cell is then at rest.
     pub unresolved: bool,
 }
@@ -155,8 +158,9 @@ impl Mesh {
         let cut: Vec<usize> = parts.all().map(|(cell, _)| cell).collect();
         for cell in cut {
             let beside = self.free_neighbours(&parts, cell);
+            let stream = parts.of(cell).and_then(|part| Stream::new(&self, cell, part, &parts));
             if let Some(part) = &mut parts.cells[cell] {
-                part.beside = beside;
+                (part.beside, part.stream) = (beside, stream.map(Box::new));
             }
         }
         self.parts = Some(Arc::new(parts));
@@ -256,6 +260,13 @@ fn grid(flipped: bool) -> [f64; SQUARES + 1] {
     })
 }
 
+/// Two orbits of three points of a triangle, with the weight of a corner's opposite coordinates, that
+/// integrate polynomials of degree 4: D. A. Dunavant, Int. J. Numer. Methods Eng. 21 (1985) 1129.
+const DUNAVANT: [(f64, f64); 2] = [
+    (0.445_948_490_915_964_9, 0.223_381_589_678_011_5),
+    (0.091_576_213_509_770_7, 0.109_951_743_655_321_9),
+];
+
 /// A fine rule for the free part of a cell; the weights are shares of the cell.
 fn rule(mesh: &Mesh, cell: usize, parts: &Parts) -> Vec<Weighted> {
     let centre = mesh.cell_centre(cell);
@@ -294,11 +305,14 @@ fn add_triangle(corners: &[(Point, f64); 3], out: &mut Vec<Weighted>) {
     for k in 1..free.len().saturating_sub(1) {
         let [a, b, c] = [free[0], free[k], free[k + 1]];
         let twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        // The reference cell has the area 4.
-        let weight = twice.abs() / 24.0;
-        if weight > 0.0 {
-            for [p, q] in [[a, b], [b, c], [c, a]] {
-                out.push(([0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])], weight));
+        if twice == 0.0 {
+            continue;
+        }
+        for (near, weight) in DUNAVANT {
+            for [p, q, r] in [[a, b, c], [b, c, a], [c, a, b]] {
+                let at = |i: usize| (1.0 - 2.0 * near) * p[i] + near * (q[i] + r[i]);
+                // The reference cell has the area 4.
+                out.push(([at(0), at(1)], weight * twice.abs() / 8.0));
             }
         }
     }
@@ -324,22 +338,23 @@ fn is_lost(mesh: &Mesh, cell: usize, parts: &Parts) -> bool {
 
 impl Part {
     fn new(cell: CellMeasure, fraction: f64, rule: Vec<Weighted>, unresolved: bool) -> Part {
+        // The slope of the pressure takes more than the biquadratic functions.
+        let mut divergence = [[[0.0; NODES]; 2]; 3];
+        for (r, weight) in &rule {
+            let (volume, shape) = (cell.of_point(*weight), Shape::at(*r));
+            for (row, q) in divergence.iter_mut().zip([1.0, r[0], r[1]]) {
+                for a in 0..NODES {
+                    row[0][a] += volume * q * shape.d_xi[a] * 2.0 / cell.size[0];
+                    row[1][a] += volume * q * shape.d_eta[a] * 2.0 / cell.size[1];
+                }
+            }
+        }
         let rule = reduced(rule);
         let mut points = [PartPoint { weight: 0.0, r: [0.0; 2], shape: Shape::at([0.0; 2]) }; 9];
         for (point, (r, weight)) in points.iter_mut().zip(rule) {
             *point = PartPoint { weight: weight / fraction, r, shape: Shape::at(r) };
         }
-        let mut divergence = [[[0.0; NODES]; 2]; 3];
-        for p in &points {
-            let volume = cell.of_point(p.weight * fraction);
-            for (row, q) in divergence.iter_mut().zip([1.0, p.r[0], p.r[1]]) {
-                for a in 0..NODES {
-                    row[0][a] += volume * q * p.shape.d_xi[a] * 2.0 / cell.size[0];
-                    row[1][a] += volume * q * p.shape.d_eta[a] * 2.0 / cell.size[1];
-                }
-            }
-        }
-        Part { fraction, points, divergence, beside: vec![], unresolved }
+        Part { fraction, points, divergence, beside: vec![], stream: None, unresolved }
     }
 
     /// Centroid, in reference coordinates.

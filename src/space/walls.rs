@@ -92,6 +92,11 @@ impl Enclosure {
             && let Some(end) = slide(parts.outlines(), p0, to)
         {
             (to, held) = (end, true);
+            for (c, axis) in [&mesh.x, &mesh.y].into_iter().enumerate() {
+                if !axis.periodic() {
+                    to[c] = to[c].clamp(axis.start(), axis.end());
+                }
+            }
         }
         if held { Landing::Held(to) } else { Landing::Free(to) }
     }

@@ -15,6 +15,7 @@ mod rayleigh_taylor;
 mod report;
 mod rest;
 mod smooth;
+mod solids;
 mod texture;
 mod transport;
 
@@ -45,7 +46,7 @@ impl Effort {
 type Subject = fn(Effort) -> Result<Section, CaseError>;
 
 /// All subjects: name on the command line, and function.
-pub const SUBJECTS: [(&str, Subject); 12] = [
+pub const SUBJECTS: [(&str, Subject); 13] = [
     ("elements", elements::section),
     ("smooth", smooth::section),
     ("cut-cells", cut_cells::section),
@@ -58,6 +59,7 @@ pub const SUBJECTS: [(&str, Subject); 12] = [
     ("texture", texture::section),
     ("flow-curves", flow_curves::section),
     ("inertia", inertia::section),
+    ("solids", solids::section),
 ];
 
 /// Verifies the subjects with the given names, in the order of [`SUBJECTS`]. `announce` is called

@@ -12,6 +12,7 @@ mod openings;
 mod order;
 mod patch;
 mod rest;
+mod solids;
 mod steps;
 mod verification;
 

@@ -1,0 +1,102 @@
+//! Solids of any shape: exact flows beside walls across the mesh, and runs in which nothing enters a
+//! solid or is lost.
+
+use grainscope::internals::{ARRAY_DRAG, SlantedChannel, array_drag, slanted_channel, wedge};
+use grainscope::sim::Run;
+
+#[test]
+fn a_channel_across_the_mesh_is_exact() {
+    for degrees in [7.0, 30.0, 41.0] {
+        let channel = SlantedChannel { degrees, width: 0.25, slips: false };
+        let e = slanted_channel(channel).errors(32, &[]).unwrap();
+        assert!(e.velocity < 3e-4, "{degrees}: {e:?}");
+    }
+}
+
+#[test]
+fn walls_that_slip_hold_the_normal_velocity_only() {
+    for degrees in [12.0, 30.0] {
+        let channel = SlantedChannel { degrees, width: 0.25, slips: true };
+        let e = slanted_channel(channel).errors(32, &[]).unwrap();
+        assert!(e.velocity < 5e-3, "{degrees}: {e:?}");
+    }
+}
+
+#[test]
+fn converging_flow_is_of_second_order() {
+    for degrees in [20.0, 30.0] {
+        let case = wedge(degrees);
+        let [a, b] = [16, 64].map(|n| case.errors(n, &[]).unwrap().velocity);
+        assert!((a / b).log2() / 2.0 > 2.0 && b < 1e-3, "{degrees}: {a:.2e} {b:.2e}");
+    }
+}
+
+#[test]
+fn cylinders_have_the_published_drag() {
+    for (fraction, published) in ARRAY_DRAG {
+        let drag = array_drag(fraction, 32).unwrap();
+        assert!((drag / published - 1.0).abs() < 1e-3, "{fraction}: {drag}");
+    }
+}
+
+fn hopper(extra: &str) -> Box<dyn Run> {
+    let text = format!(
+        "schema = 1\nname = \"hopper\"\ngravity = [0, -10]\n[domain]\nx = [-1, 1]\ny = [0, 2]\n\
+         [accuracy]\ncells = 8\n[time]\nend = 10\n[materials.mud]\nshear_viscosity = 100\n\
+         density = 1000\n[materials.air]\nshear_viscosity = 0.1\ndensity = 1\nbackground = true\n\
+         [[regions]]\nmaterial = \"mud\"\nshape.rectangle = {{ x = [-1, 1], y = [0, 1.5] }}\n\
+         [boundaries]\nleft.kind = \"no_slip\"\nright.kind = \"no_slip\"\ntop.kind = \"open\"\n\
+         [[blocks]]\nname = \"left\"\nkind = \"no_slip\"\n\
+         shape.polygon = [[-1, 1.2], [-0.3, 0.3], [-0.3, 0], [-1, 0]]\n\
+         [[blocks]]\nname = \"right\"\nkind = \"no_slip\"\n\
+         shape.polygon = [[1, 1.2], [0.3, 0.3], [0.3, 0], [1, 0]]\n{extra}"
+    );
+    crate::scene(&text, &[])
+}
+
+/// Volume that is not solid, m2.
+const FREE: f64 = 4.0 - 2.0 * (0.7 * 0.3 + 0.5 * 0.7 * 0.9);
+
+#[test]
+fn a_hopper_loses_nothing_and_stays_symmetric() {
+    let mut run = hopper(
+        "[[boundaries.bottom.parts]]\nfrom = -0.3\nto = 0.3\nkind = \"outflow\"\n\
+         [[gauges]]\nname = \"out\"\nfrom = [-0.3, 0]\nto = [0.3, 0]\ndirection = \"down\"\n\
+         material = \"mud\"\n",
+    );
+    let volume = |run: &dyn Run| {
+        let unit = run.plan().units.length.powi(2);
+        run.particles().volume.iter().sum::<f64>() * unit
+    };
+    assert!((volume(run.as_ref()) / FREE - 1.0).abs() < 1e-12, "{}", volume(run.as_ref()));
+    for _ in 0..60 {
+        run.step().unwrap();
+        for &p in &run.particles().position {
+            let [x, y] = run.plan().si(p);
+            let wall = if y < 0.3 { 0.3 } else { 0.3 + (y - 0.3) * 0.7 / 0.9 };
+            assert!(x.abs() <= wall.min(1.0) + 1e-12, "{x} {y}");
+        }
+    }
+    let row = run.row();
+    assert!(row.gauges[0].volume > 0.1, "{}", row.gauges[0].volume);
+    assert!(row.volume_error < 0.2, "{}", row.volume_error);
+    let [left, right] = [-0.1, 0.1].map(|x| run.velocity_at([x, 0.4]));
+    assert!((left[1] - right[1]).abs() < 1e-3 * left[1].abs(), "{left:?} {right:?}");
+    assert!((left[0] + right[0]).abs() < 1e-3 * left[1].abs(), "{left:?} {right:?}");
+}
+
+#[test]
+fn a_level_in_a_closed_hopper_rests() {
+    let mut run = hopper("[boundaries.bottom]\nkind = \"no_slip\"\n");
+    for _ in 0..3 {
+        run.step().unwrap();
+    }
+    // Speed of a layer of the height of a cell that runs down.
+    let scale = 1000.0 * 10.0 * 0.125 * 0.125 / 100.0;
+    let fastest = [[-0.5, 1.0], [0.0, 0.2], [0.0, 1.0], [-0.4, 0.5], [0.7, 1.1]]
+        .map(|p| run.velocity_at(p))
+        .map(|u| u[0].hypot(u[1]))
+        .into_iter()
+        .fold(0.0, f64::max);
+    assert!(fastest < 1e-6 * scale, "{fastest} {scale}");
+}
