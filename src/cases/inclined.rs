@@ -26,7 +26,7 @@ impl Inclined {
         let (s, c) = self.degrees.to_radians().sin_cos();
         format!(
             "schema = 1\nname = \"inclined\"\n[domain]\nx = [-0.5, 0.5]\ny = [-0.5, 0.5]\n\
-             [accuracy]\nplacement = \"jittered\"\n[time]\nend = 1\n[materials.lower]\n\
+             [accuracy]\nplacement = \"jittered\"\n[time]\nsteady = true\n[materials.lower]\n\
              shear_viscosity = 1\n[materials.upper]\nshear_viscosity = {:e}\n[[regions]]\n\
              material = \"lower\"\n[[regions]]\nmaterial = \"upper\"\n\
              shape.where = \"{c:?}*y > {s:?}*x\"\n[boundaries]\n{boundaries}",

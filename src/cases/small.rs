@@ -68,7 +68,7 @@ fn scene(shape: &str, [a, b]: [f64; 2], contrast: f64) -> SceneSource {
         ["left", "right", "bottom", "top"].map(|name| format!("{name} = {side}\n")).concat();
     let text = format!(
         "schema = 1\nname = \"small\"\n[domain]\nx = [-0.5, 0.5]\ny = [-0.5, 0.5]\n[accuracy]\n\
-         placement = \"jittered\"\n[time]\nend = 1\n[materials.around]\nshear_viscosity = 1\n\
+         placement = \"jittered\"\n[time]\nsteady = true\n[materials.around]\nshear_viscosity = 1\n\
          [materials.inside]\nshear_viscosity = {contrast:e}\n[[regions]]\nmaterial = \"around\"\n\
          [[regions]]\nmaterial = \"inside\"\nshape.where = \"{shape}\"\n[boundaries]\n{sides}"
     );

@@ -3,8 +3,8 @@
 use super::frozen_flow::{CELL_GRAIN, FrozenFlow};
 use super::gauges::Counter;
 use crate::plan::EffectSet;
+use crate::space::count::Count;
 use crate::space::particles::{GONE, GRAIN, Particles};
-use crate::space::population::Count;
 use crate::threads::{self, Divisible};
 
 /// Positions, directors and volume factors of all particles after a step. The buffers are reused in
@@ -126,7 +126,10 @@ pub fn advance(
         }
     }
     count.held += held.iter().filter(|&&held| held).count() as u64;
-    count.left += cell.iter().filter(|&&cell| cell == GONE).count() as u64;
+    for (p, _) in cell.iter().enumerate().filter(|&(_, &cell)| cell == GONE) {
+        count.left += 1;
+        count.volume_out += particles.volume[p];
+    }
     if mesh.x.periodic() || mesh.y.periodic() {
         threads::for_each(to, GRAIN, |_, p| *p = mesh.wrap(*p));
     }

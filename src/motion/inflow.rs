@@ -1,145 +1,223 @@
-//! This module lets the background material enter through openings in the sides of the domain, so
-//! that the particles fill the domain while material leaves it elsewhere.
+//! This module lets material enter through the sides of the domain, so that the particles fill the
+//! domain while material is pushed in, or while material leaves it elsewhere.
 //!
 //! The volume that the velocity carries inwards across a part `F` of a face in a step,
 //!
 //! ```text
 //! V = dt max(-integral over F of u . n, 0)
 //! ```
-//! becomes background next to the face. It is added to the nearest small particle of the
-//! background in the cell, which moves so that the centroid of the volumes is kept, or makes a new
-//! particle. So the volume of all particles changes by what enters and what leaves, to rounding,
-//! and no volume is kept anywhere else.
+//! becomes material next to the face. It is divided into parts that are not larger than a usual
+//! particle, which lie where what enters evenly during the step is at its end. Each is added to the
+//! nearest small particle of its material in the cell, which moves so that the centroid of the
+//! volumes is kept, or makes a new particle. So the volume of all particles changes by what enters
+//! and what leaves, to rounding, and no volume is kept anywhere else. What enters carries the
+//! directors, the viscosity and the density that the scene gives at the face.
 
 use super::gauges::Counter;
-use crate::plan::Plan;
-use crate::space::mesh::Mesh;
+use crate::plan::{Entering, InitialFields, Plan};
+use crate::space::mesh::{INSIDE, Mesh};
 use crate::space::particles::Particles;
 use crate::space::shape::{SIDE_NODES, Shape, side_normal};
 
-/// Faces on sides of the domain through which the background enters.
+/// Pieces of a part of a face that a solid may cover.
+const PIECES: usize = 16;
+
+/// Faces on sides of the domain through which material may enter.
 #[derive(Clone, Debug)]
 pub struct Inflow {
-    /// Index of the background material.
-    material: u8,
-    /// Cells at openings, with the side of the domain.
-    faces: Vec<(usize, usize)>,
+    faces: Vec<Face>,
+    /// What enters through the faces.
+    entering: Vec<Entering>,
     /// Number of particles along a cell at the start.
     particles_along: usize,
 }
 
-/// Volume that enters through a part of a face in a step.
+/// A face through which material may enter.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    cell: usize,
+    /// Side of the cell and of the domain.
+    side: usize,
+    /// Index into [`Inflow::entering`].
+    entering: usize,
+}
+
+/// A part of what enters through a face in a step.
 struct Entry {
     cell: usize,
+    material: u8,
     volume: f64,
-    /// Centroid of the volume at the end of the step.
+    /// Its position at the end of the step.
     at: [f64; 2],
     /// A point outside the domain from which it came.
     from: [f64; 2],
+    /// Director, viscosity and density that it carries.
+    carried: ([f64; 2], [f64; 2]),
 }
 
 impl Inflow {
-    /// The faces of a plan without a prescribed normal velocity through which particles leave;
-    /// `None` if there are none or the plan has no background.
+    /// The faces of a plan through which it is known what enters; `None` if there are none.
     pub fn new(plan: &Plan) -> Option<Inflow> {
-        let material = plan.background()?;
         let mesh = &plan.mesh;
-        let open = plan.boundary.pieces().filter(|(s, piece)| {
-            piece.open && piece.conditions.velocity[side_normal(*s)].is_none()
-        });
-        let faces: Vec<_> = open
-            .flat_map(|(s, piece)| piece.segment.cells_at_side(mesh, s).map(move |(_, c)| (c, s)))
-            .filter(|&(cell, _)| !mesh.solid[cell])
-            .collect();
-        let particles_along = plan.method.seeding.side;
-        (!faces.is_empty()).then_some(Inflow { material, faces, particles_along })
+        let mut out =
+            Inflow { faces: vec![], entering: vec![], particles_along: plan.method.seeding.side };
+        for (side, piece) in plan.boundary.pieces() {
+            let Some(entering) = &piece.enters else { continue };
+            out.entering.push(entering.clone());
+            let entering = out.entering.len() - 1;
+            let cells = piece.segment.cells_at_side(mesh, side).map(|(_, cell)| cell);
+            let cells = cells.filter(|&cell| !mesh.solid[cell]);
+            out.faces.extend(cells.map(|cell| Face { cell, side, entering }));
+        }
+        (!out.faces.is_empty()).then_some(out)
     }
 
-    /// Adds the background that enters in a step of length `dt` with the nodal velocities
-    /// `velocity`, and counts it at the gauges. `particles` must be sorted, and are sorted on return.
+    /// The cells at the faces through which a material other than `background` may enter.
+    pub fn cells_of_interest(&self, background: Option<u8>) -> impl Iterator<Item = usize> + '_ {
+        let of_interest = move |f: &&Face| Some(self.entering[f.entering].material) != background;
+        self.faces.iter().filter(of_interest).map(|f| f.cell)
+    }
+
+    /// Adds what enters in a step of length `dt` with the nodal velocities `velocity`, counts it at
+    /// the gauges, and returns its volume. `particles` must be sorted, and are sorted on return.
     pub fn enter(
         &self,
-        mesh: &Mesh,
+        plan: &Plan,
         (velocity, dt): (&[[f64; 2]], f64),
         particles: &mut Particles,
         gauges: &mut [Counter],
-    ) {
+    ) -> f64 {
+        let mesh = &*plan.mesh;
         let before = particles.len();
-        for &(cell, side) in &self.faces {
+        let mut sum = 0.0;
+        for face in &self.faces {
             for k in 0..self.particles_along {
-                if let Some(entry) = self.entry(mesh, (velocity, dt), (cell, side), k) {
+                self.entries(plan, (velocity, dt), face, k, |entry| {
                     for gauge in gauges.iter_mut() {
-                        gauge.pass(mesh, entry.from, entry.at, self.material, entry.volume);
+                        gauge.pass(mesh, entry.from, entry.at, entry.material, entry.volume);
                     }
+                    sum += entry.volume;
                     self.add(mesh, particles, &entry);
-                }
+                });
             }
         }
         if particles.len() != before {
             particles.sort(mesh);
         }
+        sum
     }
 
-    /// What enters through part `k` of the parts of equal size of a face, if anything does.
-    fn entry(
+    /// Calls `add` with what enters through part `k` of the parts of equal size of a face.
+    fn entries(
         &self,
-        mesh: &Mesh,
+        plan: &Plan,
         (velocity, dt): (&[[f64; 2]], f64),
-        (cell, side): (usize, usize),
+        &Face { cell, side, entering }: &Face,
         k: usize,
-    ) -> Option<Entry> {
+        mut add: impl FnMut(Entry),
+    ) {
+        let mesh = &*plan.mesh;
         let normal = side_normal(side);
         let outwards = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
         let nodes = mesh.cell_nodes(cell);
-        let outflow = SIDE_NODES[side].map(|a| outwards * velocity[nodes[a]][normal]);
-        let at =
-            |t: f64| -> f64 { Shape::line(t).into_iter().zip(outflow).map(|(n, u)| n * u).sum() };
+        let nodal = SIDE_NODES[side].map(|a| velocity[nodes[a]]);
+        let at = |t: f64, c: usize| -> f64 {
+            Shape::line(t).into_iter().zip(nodal).map(|(n, u)| n * u[c]).sum()
+        };
         let width = 2.0 / self.particles_along as f64;
         let low = -1.0 + k as f64 * width;
         let [middle, high] = [low + 0.5 * width, low + width];
         // Simpson's rule is exact for quadratic functions.
-        let speed = -(at(low) + 4.0 * at(middle) + at(high)) / 6.0;
+        // Nothing enters through what a solid covers.
+        let free = |t: f64| {
+            let r = if normal == 0 { [outwards, t] } else { [t, outwards] };
+            !mesh.is_solid_in(cell, mesh.from_reference(cell, r))
+        };
+        let mean = |c: usize| {
+            if mesh.part(cell).is_none() {
+                return (at(low, c) + 4.0 * at(middle, c) + at(high, c)) / 6.0;
+            }
+            let pieces = (0..PIECES).map(|k| low + width * (k as f64 + 0.5) / PIECES as f64);
+            pieces.filter(|&t| free(t)).map(|t| at(t, c)).sum::<f64>() / PIECES as f64
+        };
+        let speed = -outwards * mean(normal);
         if speed <= 0.0 {
-            return None;
+            return;
         }
+        let size = mesh.cell_size(cell);
         let volume = dt * speed * mesh.face_area(cell, normal) / self.particles_along as f64;
-        let depth = dt * speed / mesh.cell_size(cell)[normal];
-        let point = |inside: f64| {
+        // A step crosses at most a cell; a longer way would end in another cell.
+        let depth = (dt * speed / size[normal]).min(1.0);
+        let drift = 2.0 * dt * mean(1 - normal) / size[1 - normal];
+        let point = |inside: f64, along: f64| {
             let across = outwards * (1.0 - 2.0 * inside);
-            let r = if normal == 0 { [across, middle] } else { [middle, across] };
+            let r = if normal == 0 { [across, along] } else { [along, across] };
             mesh.from_reference(cell, r)
         };
-        // A step crosses at most a cell; a longer way would end in another cell.
-        let inside = (0.5 * depth).min(0.5);
-        // Nothing enters through what a solid covers.
-        if [0.0, inside].iter().any(|&t| mesh.is_solid_in(cell, point(t))) {
-            return None;
+        let material = self.entering[entering].material;
+        let carried = self.carried(plan, &self.entering[entering], point(0.0, middle));
+        let parts = (volume / self.usual(mesh, cell)).ceil().max(1.0);
+        for part in 0..parts as usize {
+            let share = (part as f64 + 0.5) / parts;
+            let along = (middle + share * drift).clamp(-INSIDE, INSIDE);
+            let (mut at, from) = (point(share * depth, along), point(-share * depth, middle));
+            if let Some(part) = mesh.part(cell)
+                && mesh.is_solid_in(cell, at)
+            {
+                at = mesh.free_place(cell, part);
+            }
+            add(Entry { cell, material, volume: volume / parts, at, from, carried });
         }
-        Some(Entry { cell, volume, at: point(inside), from: point(-inside) })
     }
 
-    /// Adds the volume of an entry to the nearest particle of the background in its cell that is
-    /// not larger than usual afterwards, or else as a new particle.
+    /// Director, and viscosity and density, that a particle carries which enters at a point.
+    fn carried(&self, plan: &Plan, entering: &Entering, at: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+        let [x, y] = plan.si(at);
+        let angle = entering.director.as_ref().map_or(90.0, |f| f.at(x, y)).to_radians();
+        let InitialFields { viscosity, density } = &plan.initial[usize::from(entering.material)];
+        let fields = [(viscosity, plan.units.viscosity), (density, plan.units.density)];
+        let values = fields.map(|(f, unit)| f.as_ref().map_or(0.0, |f| f.at(x, y) / unit));
+        ([angle.cos(), angle.sin()], values)
+    }
+
+    /// Volume of a usual particle in a cell.
+    fn usual(&self, mesh: &Mesh, cell: usize) -> f64 {
+        mesh.cell_volume(cell) / self.particles_along.pow(2) as f64
+    }
+
+    /// Adds an entry to the nearest particle of its material in its cell that is not larger than
+    /// usual afterwards, or else as a new particle.
     fn add(&self, mesh: &Mesh, particles: &mut Particles, entry: &Entry) {
-        let &Entry { cell, volume, at, .. } = entry;
-        let usual = mesh.cell_volume(cell) / self.particles_along.pow(2) as f64;
+        let &Entry { cell, material, volume, at, carried: (director, values), .. } = entry;
+        let usual = self.usual(mesh, cell);
         let [hx, hy] = mesh.cell_size(cell);
         let distance = |p: usize| {
             let d = particles.position[p];
             ((d[0] - at[0]) / hx).powi(2) + ((d[1] - at[1]) / hy).powi(2)
         };
+        let marked = |p: usize| particles.mark.as_ref().is_some_and(|m| m[p]);
         let small = |&p: &usize| {
-            particles.material[p] == self.material && particles.volume[p] + volume <= usual
+            particles.material[p] == material && particles.volume[p] + volume <= usual && !marked(p)
         };
         let nearest = particles
             .of_cell(cell)
             .filter(small)
             .min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-        let Some(p) = nearest else { return particles.push(at, volume, self.material) };
-        let share = volume / (particles.volume[p] + volume);
-        for c in 0..2 {
-            particles.position[p][c] += share * (at[c] - particles.position[p][c]);
+        particles.push(at, volume, material);
+        let new = particles.len() - 1;
+        if let Some(column) = &mut particles.director {
+            column[new] = director;
         }
-        particles.volume[p] += volume;
+        for (column, value) in
+            [&mut particles.viscosity, &mut particles.density].into_iter().zip(values)
+        {
+            if let Some(column) = column {
+                column[new] = value;
+            }
+        }
+        if let Some(p) = nearest {
+            particles.absorb(p, new);
+            particles.pop();
+        }
     }
 }

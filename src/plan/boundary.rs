@@ -44,6 +44,18 @@ pub struct Piece {
     pub conditions: Conditions,
     /// Whether particles leave through it.
     pub open: bool,
+    /// What enters through it; `None` if it is not known, so that particles near it are split
+    /// instead.
+    pub enters: Option<Entering>,
+}
+
+/// What enters through a piece of a side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entering {
+    /// Index of the material.
+    pub material: u8,
+    /// Angle between its directors and the x axis, degrees, as a function of SI coordinates.
+    pub director: Option<FieldFn>,
 }
 
 /// A side of the domain.

@@ -1,19 +1,20 @@
 //! This module finds differences between two plans other than values that may change during a run.
 
 use super::material::Material;
-use super::{Gauge, Matter, Plan, Tracers};
+use super::{Entering, Gauge, Matter, Plan, Tracers};
 use crate::space::parts::Parts;
 
 impl Plan {
     /// Short description of a difference other than the values of materials and gravity, which
     /// alone may change during a run; `None` if there is no such difference.
     pub fn beyond_matter(&self, other: &Plan) -> Option<&'static str> {
-        let checks: [(bool, &str); 11] = [
+        let checks: [(bool, &str); 12] = [
             (geometry(self) != geometry(other), "the mesh"),
             (self.effects != other.effects, "the set of solved effects"),
             (!same_history(&self.state, &other.state), "the kind of a material"),
             (self.initial != other.initial, "the values that particles carry"),
             (supports(self) != supports(other), "the boundaries"),
+            (enters(self) != enters(other), "what enters through the boundaries"),
             (
                 loads(self) != loads(other) || self.acceleration != other.acceleration,
                 "the boundaries' values or the loads",
@@ -42,6 +43,11 @@ fn supports(p: &Plan) -> ([Vec<[f64; 2]>; 4], [bool; 2], bool) {
     let si =
         |ranges: &Vec<[f64; 2]>| ranges.iter().map(|r| r.map(|v| v * p.units.length)).collect();
     (p.enclosure.open.each_ref().map(si), p.boundary.free_translation, p.boundary.closed)
+}
+
+/// What enters through the pieces of the sides.
+fn enters(p: &Plan) -> Vec<Option<&Entering>> {
+    p.boundary.pieces().map(|(_, piece)| piece.enters.as_ref()).collect()
 }
 
 /// Gauges, dye lines and marks in SI units.

@@ -18,7 +18,7 @@ mod resolve;
 pub mod units;
 mod warning;
 
-pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
+pub use boundary::{BoundaryPlan, Conditions, Entering, Piece, Side, WallLine};
 pub use effects::{Effect, EffectKind, EffectList, StepTime};
 pub use resolve::resolve;
 pub use units::Units;
@@ -330,6 +330,11 @@ impl Plan {
     pub fn halfway_inertial_number(&self) -> Option<f64> {
         let of = |m: &Material| Some(m.law.curve.as_ref()?.friction()?.inertial_number);
         self.state.materials.iter().filter_map(of).reduce(f64::max)
+    }
+
+    /// Whether particles may enter or leave through sides.
+    pub fn exchanges_volume(&self) -> bool {
+        self.enclosure.is_open()
     }
 
     /// Whether gravity or an acceleration acts on the materials.

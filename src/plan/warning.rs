@@ -80,11 +80,6 @@ pub enum Warning {
     },
     /// A denser material rests exactly level on a lighter one.
     UnstableRest,
-    /// A side has a prescribed velocity through it.
-    ThroughFlow {
-        /// Side of the domain, as its key in the scene.
-        place: String,
-    },
 }
 
 impl fmt::Display for Warning {
@@ -173,12 +168,6 @@ impl fmt::Display for Warning {
                 "a denser material lies level on a lighter one: this is an exact equilibrium, and \
                  nothing moves although it is unstable; perturb it, for instance by a region with \
                  shape.where = \"y < 0.5 + 0.01*cos(pi*x)\""
-            ),
-            Warning::ThroughFlow { place } => write!(
-                f,
-                "{place} prescribes a velocity through it: particles leave with the outflow, but no \
-                 particles enter with the inflow, where nearby ones are split instead; interpret \
-                 long runs with care, or use periodic sides"
             ),
         }
     }

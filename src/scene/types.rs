@@ -537,6 +537,15 @@ pub enum Director {
     Random,
 }
 
+/// Directors of a layered material that enters through a side.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InflowDirector {
+    /// Angle between the layer normal and the x axis; may depend on x and y.
+    #[schemars(extend("x-unit" = "degrees", "x-range" = "any", "examples" = ["90*y"]))]
+    pub angle_degrees: Field,
+}
+
 /// Boundary conditions at the four sides of the domain.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -619,6 +628,19 @@ pub struct Boundary {
         "examples" = [0]
     ))]
     pub rotation: Option<Field>,
+    /// Name of the material that enters where the side lets material in: where the normal velocity
+    /// is given and points inwards, or where nothing holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "a material",
+        "x-default" = "the background, or the only material",
+        "examples" = ["sand"]
+    ))]
+    pub inflow: Option<String>,
+    /// Directors of the material that enters; required for a layered material.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "none", "examples" = [{ "angle_degrees": 45 }]))]
+    pub inflow_director: Option<InflowDirector>,
     /// Parts of the side with other conditions, such as openings; the rest of the side is as the
     /// keys above say.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -690,6 +712,19 @@ pub struct BoundaryPart {
         "examples" = [0]
     ))]
     pub rotation: Option<Field>,
+    /// Name of the material that enters where the side lets material in: where the normal velocity
+    /// is given and points inwards, or where nothing holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "a material",
+        "x-default" = "the background, or the only material",
+        "examples" = ["sand"]
+    ))]
+    pub inflow: Option<String>,
+    /// Directors of the material that enters; required for a layered material.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "none", "examples" = [{ "angle_degrees": 45 }]))]
+    pub inflow_director: Option<InflowDirector>,
 }
 
 /// Conditions that are written for a side or for a part of it.
@@ -703,6 +738,10 @@ pub struct Given<'a> {
     pub traction: [Option<&'a Field>; 2],
     /// Prescribed Cosserat rotation rate.
     pub rotation: Option<&'a Field>,
+    /// Name of the material that enters.
+    pub inflow: Option<&'a str>,
+    /// Its directors.
+    pub inflow_director: Option<&'a InflowDirector>,
 }
 
 /// Implements `given` for types that have the keys of a side.
@@ -716,6 +755,8 @@ macro_rules! given {
                     velocity: [self.velocity_x.as_ref(), self.velocity_y.as_ref()],
                     traction: [self.traction_x.as_ref(), self.traction_y.as_ref()],
                     rotation: self.rotation.as_ref(),
+                    inflow: self.inflow.as_deref(),
+                    inflow_director: self.inflow_director.as_ref(),
                 }
             }
         }
@@ -739,10 +780,10 @@ pub enum BoundaryKind {
     FreeSlip,
     /// Zero velocity.
     NoSlip,
-    /// Zero traction: fluid passes in any direction. What enters is the background.
+    /// Zero traction: fluid passes in any direction. What enters is `inflow`.
     Open,
     /// Zero normal traction and zero tangential velocity: fluid passes along the normal, as from a
-    /// slit into the open air. What enters is the background.
+    /// slit into the open air. What enters is `inflow`.
     Outflow,
     /// Joined to the opposite side, which must also be periodic.
     Periodic,

@@ -95,26 +95,24 @@ impl Guard {
 /// The conserved volume of a state.
 #[derive(Clone, Copy)]
 struct Volume {
-    /// Total volume of the particles, in the plan's units.
+    /// Total volume of the particles, plus what has left the domain, minus what has entered it, in
+    /// the plan's units.
     volume: f64,
-    /// Number of particles that have left the domain.
-    left: u64,
+    /// Total volume of the particles.
+    inside: f64,
 }
 
 impl Volume {
     fn of(run: &dyn Run) -> Volume {
-        Volume { volume: run.particles().volume.iter().sum(), left: run.count().left }
+        let (inside, count) = (run.particles().volume.iter().sum(), run.count());
+        Volume { volume: inside + count.volume_out - count.volume_in, inside }
     }
 
-    /// Checks that the volume is conserved, unless particles left or may have entered, or the scene is
-    /// compressible.
+    /// Checks that the volume is conserved, unless the scene is compressible.
     fn check(self, run: &dyn Run) -> Result<(), Fault> {
         let (now, plan) = (Volume::of(run), run.plan());
-        let change = (now.volume / self.volume - 1.0).abs();
-        // The background may enter through openings.
-        let filled = plan.enclosure.is_open() && plan.background().is_some();
-        let constant = now.left == self.left && !filled && !plan.effects.volume_change;
-        if constant && change > VOLUME {
+        let change = (now.volume - self.volume).abs() / self.inside;
+        if !plan.effects.volume_change && change > VOLUME {
             return Err(Fault::Volume { change });
         }
         Ok(())
@@ -147,8 +145,8 @@ mod tests {
     use crate::sim::row::Row;
     use crate::sim::state::StateError;
     use crate::solve::multifrontal::Effort;
+    use crate::space::count::Count;
     use crate::space::particles::Particles;
-    use crate::space::population::Count;
     use crate::{plan, scene, sim};
     use std::sync::Arc;
 

@@ -9,8 +9,9 @@
 use super::sampling::{Filling, Sample, filling, samples};
 use crate::plan::{InitialDirector, Mark, Plan};
 use crate::scene::FieldFn;
+use crate::space::count::Count;
 use crate::space::particles::Particles;
-use crate::space::population::{Count, Population};
+use crate::space::population::Population;
 use rand::Rng;
 use rand_pcg::Pcg64;
 

@@ -17,9 +17,16 @@ pub(super) struct Interest {
 }
 
 impl Interest {
-    /// Determines the nodes. If no cell counts (all materials of interest are smaller than a cell,
-    /// or there are none), all nodes count.
-    pub(super) fn update(&mut self, mesh: &Mesh, of: &Composition, background: Option<u8>) {
+    /// Determines the nodes; those of the cells into which materials of interest enter count too. If
+    /// no cell counts (all materials of interest are smaller than a cell, or there are none), all
+    /// nodes count.
+    pub(super) fn update(
+        &mut self,
+        mesh: &Mesh,
+        of: &Composition,
+        background: Option<u8>,
+        entering: impl Iterator<Item = usize>,
+    ) {
         self.nodes.clear();
         let Some(background) = background else { return self.nodes.resize(mesh.nodes(), true) };
         self.nodes.resize(mesh.nodes(), false);
@@ -28,6 +35,9 @@ impl Interest {
         };
         for cell in (0..mesh.cells()).filter(counts) {
             self.nodes[mesh.cell_nodes(cell)[CENTRE]] = true;
+        }
+        for node in entering.flat_map(|cell| mesh.cell_nodes(cell)) {
+            self.nodes[node] = true;
         }
         if !self.nodes.contains(&true) {
             self.nodes.fill(true);

@@ -11,8 +11,8 @@ use super::phases::Phases;
 use crate::plan::material::Material;
 use crate::plan::{Plan, Units};
 use crate::solve::report::Report;
+use crate::space::count::Count;
 use crate::space::particles::Particles;
-use crate::space::population::Count;
 use serde::Serialize;
 
 /// A column of the series.
@@ -401,6 +401,14 @@ columns! {
     merges: u64 = |m| m.count.merges, 0, { label: "merges", rank: Rank::Never };
     /// Number of times that a wall stopped a particle since the start.
     held: u64 = |m| m.count.held, 0, { label: "held at walls", rank: Rank::Never };
+    /// Volume that has entered through sides since the start.
+    volume_in: f64 = |m| m.count.volume_in * m.units.area(), 0.0, {
+        unit: "m²", label: "volume in", exists: Plan::exchanges_volume,
+    };
+    /// Volume that has left through sides since the start.
+    volume_out: f64 = |m| m.count.volume_out * m.units.area(), 0.0, {
+        unit: "m²", label: "volume out", exists: Plan::exchanges_volume,
+    };
     /// Number of iterations for friction, yield stresses and power laws, in the solution at the end of
     /// the step.
     nonlinear_iterations: u32 = |m| m.nonlinear, 0, {

@@ -6,9 +6,9 @@ use super::row::Row;
 use super::state::{State, StateError};
 use crate::plan::{Plan, Warning};
 use crate::solve::multifrontal::Effort;
+use crate::space::count::Count;
 use crate::space::flow::Flow;
 use crate::space::particles::Particles;
-use crate::space::population::Count;
 use std::sync::Arc;
 
 /// A run; its plan determines the number of unknowns per node.

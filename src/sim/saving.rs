@@ -6,9 +6,9 @@ use super::row::{self, COLUMNS, GaugeRow, Row};
 use super::simulation::{Before, Simulation};
 use super::state::{State, StateError, flat, load_phases, save_phases, wrong_length};
 use crate::solve::last_flow::Iterate;
+use crate::space::count::Count;
 use crate::space::flow::Flow;
 use crate::space::particles::Particles;
-use crate::space::population::Count;
 
 fn save_particles(p: &Particles, s: &mut State) {
     s.put_floats("particles.position", flat(&p.position));
@@ -203,6 +203,9 @@ impl<const D: usize> Simulation<D> {
         }
         let c = self.count;
         s.put_counts("count", [c.splits, c.merges, c.held, c.left, c.healed]);
+        if self.plan.exchanges_volume() {
+            s.put_floats("count.volumes", [c.volume_in, c.volume_out]);
+        }
         s.put_counts("progress", [self.step, u64::from(self.version), self.next_change as u64]);
         s.put_floats("time", [self.time]);
         s.put_floats("tolerated", self.tolerated);
@@ -259,6 +262,10 @@ impl<const D: usize> Simulation<D> {
         let refilled = s.exactly("gauges.refilled", self.gauges.len())?;
         let dye = self.dye.as_ref().map(|_| dye_lines(s)).transpose()?;
         let [splits, merges, held, left, healed] = s.tally("count")?;
+        let [volume_in, volume_out] = match s.try_floats("count.volumes") {
+            Some(_) => s.numbers("count.volumes")?,
+            None => [0.0; 2],
+        };
         let [step, version, next_change] = s.tally("progress")?;
         let changes = plan.changes.get(..next_change as usize).ok_or(StateError::Range {
             name: "progress (changes)",
@@ -300,14 +307,15 @@ impl<const D: usize> Simulation<D> {
         if let (Some(dye), Some(lines)) = (&mut self.dye, dye) {
             dye.lines = lines;
         }
-        self.count = Count { splits, merges, held, left, healed };
+        self.count = Count { splits, merges, held, left, healed, volume_in, volume_out };
         (self.step, self.version, self.next_change) = (step, version, next_change as usize);
         self.time = time;
         self.tolerated = tolerated;
         self.first_energy = first_energy;
         self.flowed = flowed;
         self.recent_energy = recent_energy;
-        self.interest.update(mesh, self.quadrature.composition(), plan.background());
+        let entering = self.inflow.iter().flat_map(|i| i.cells_of_interest(plan.background()));
+        self.interest.update(mesh, self.quadrature.composition(), plan.background(), entering);
         self.baseline = baseline.to_vec();
         self.last_other_power = last_other_power;
         self.row = row;

@@ -19,10 +19,11 @@ use crate::solve::quadrature::Quadrature;
 use crate::solve::report::Report;
 use crate::solve::stokes::Stokes;
 use crate::solve::terms::Terms;
+use crate::space::count::Count;
 use crate::space::flow::Flow;
 use crate::space::neighbours::{Face, Neighbours, open_faces};
 use crate::space::particles::Particles;
-use crate::space::population::{Count, Population};
+use crate::space::population::Population;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -73,7 +74,7 @@ pub struct Simulation<const D: usize> {
     /// Index of the next scheduled change.
     pub(super) next_change: usize,
     pub(super) population: Population,
-    /// Openings through which the background enters, if there are any.
+    /// Faces through which material enters, if there are any.
     pub(super) inflow: Option<Inflow>,
     pub(super) gauges: Vec<Counter>,
     pub(super) dye: Option<DyeLines>,

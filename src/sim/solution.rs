@@ -43,7 +43,8 @@ impl<const D: usize> Simulation<D> {
                 SimError::Empty { step, time, source }
             })?;
         let background = self.plan.background();
-        self.interest.update(&plan.mesh, self.quadrature.composition(), background);
+        let entering = self.inflow.iter().flat_map(|i| i.cells_of_interest(background));
+        self.interest.update(&plan.mesh, self.quadrature.composition(), background, entering);
         seconds.quadrature += phase.elapsed().as_secs_f64();
         let phase = Instant::now();
         self.update_load();

@@ -9,8 +9,8 @@ use super::simulation::{Before, Simulation};
 use crate::motion::advect;
 use crate::motion::frozen_flow::FrozenFlow;
 use crate::plan::When;
+use crate::space::count::Count;
 use crate::space::flow::Flow;
-use crate::space::population::Count;
 use std::time::Instant;
 
 /// A step is shortened if the half-step velocity exceeds its Courant limit by this factor.
@@ -103,7 +103,8 @@ impl<const D: usize> Simulation<D> {
             );
             if let Some(inflow) = &self.inflow {
                 let flow = (&*self.half, part);
-                inflow.enter(&plan.mesh, flow, &mut self.particles, &mut self.gauges);
+                self.count.volume_in +=
+                    inflow.enter(&plan, flow, &mut self.particles, &mut self.gauges);
             }
             if let Some(dye) = &mut self.dye {
                 let phase = Instant::now();
@@ -213,7 +214,7 @@ impl<const D: usize> Simulation<D> {
                 &mut ignored,
             );
             if let Some(inflow) = inflow {
-                inflow.enter(&plan.mesh, (half, part), &mut there, no_gauges);
+                inflow.enter(&plan, (half, part), &mut there, no_gauges);
             }
         }
         self.population.control(&plan.mesh, &mut there, &mut ignored);

@@ -3,6 +3,7 @@
 
 mod carried;
 pub mod constraints;
+pub mod count;
 pub mod embedding;
 pub mod fit;
 pub mod flow;

@@ -158,6 +158,13 @@ impl Particles {
         });
     }
 
+    /// Removes the last particle.
+    pub fn pop(&mut self) {
+        for_columns!(self, |c| {
+            c.pop();
+        });
+    }
+
     /// Removes the particles for which `gone` is true; the others keep their order.
     pub fn remove(&mut self, gone: &[bool]) {
         for_columns!(self, |c| {

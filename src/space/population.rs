@@ -26,6 +26,7 @@
 //! silo, at 6 cells per aperture graded by 8, by a quarter of the aperture at 0.7 ms.
 
 use super::carried::CarriedFields;
+use super::count::Count;
 use super::mesh::Mesh;
 use super::neighbours::Neighbours;
 use super::particles::Particles;
@@ -44,21 +45,6 @@ const GRAIN: usize = 256;
 
 /// Largest reference coordinate of shifted particles.
 const INSIDE: f64 = 0.999;
-
-/// Numbers of events of particles, accumulated over a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Count {
-    /// Splits of a particle.
-    pub splits: u64,
-    /// Merges of two particles.
-    pub merges: u64,
-    /// Particles stopped at walls that their step would have crossed.
-    pub held: u64,
-    /// Particles that left through an open side.
-    pub left: u64,
-    /// Empty cells that were refilled from a neighbour, except with the background.
-    pub healed: u64,
-}
 
 /// Volume per depth (in the plan's units) of a material that was moved into an empty cell.
 #[derive(Clone, Copy, Debug)]

@@ -203,6 +203,39 @@ const FAULTS: &[Fault] = &[
         &["boundaries.left is periodic and has parts", "remove the parts"],
     ),
     (
+        "left.kind = \"free_slip\"",
+        "left = { velocity_x = 0.25, inflow = \"sadn\" }",
+        "",
+        &["boundaries.left names the material `sadn`", "did you mean `sand`?"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left = { kind = \"no_slip\", inflow = \"sand\" }",
+        "",
+        &["boundaries.left lets nothing in: its velocity_x is zero", "give velocity_x = <m/s>"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left = { velocity_x = \"-1 - y\", inflow = \"sand\" }",
+        "",
+        &["boundaries.left lets nothing in", "points outwards", "change the sign of velocity_x"],
+    ),
+    (
+        "[boundaries]\nleft.kind = \"free_slip\"\nright.kind = \"free_slip\"",
+        "[materials.mud]\nshear_viscosity = 1\n[[regions]]\nmaterial = \"mud\"\n\
+         shape.circle = { centre = [1, 0.5], radius = 0.3 }\n[boundaries]\n\
+         left.velocity_x = 0.25\nright.kind = \"open\"",
+        "0.25",
+        &["enters through boundaries.left, but it is not known which", "materials: sand, mud"],
+    ),
+    (
+        "[boundaries]\nleft.kind = \"free_slip\"",
+        "[materials.mud]\nshear_viscosity = 1\nlayer_viscosity = 0.5\n[boundaries]\n\
+         left = { kind = \"open\", inflow = \"mud\" }",
+        "",
+        &["boundaries.left lets in the layered material `mud` without", "inflow_director = {"],
+    ),
+    (
         "bottom.kind = \"free_slip\"",
         "bottom.parts = [{ from = 0.5, to = 1 }]",
         "",

@@ -376,15 +376,28 @@ fn compressible_particles_change_volume_with_the_flow() {
             "schema = 1\nname = \"squeeze\"\n[domain]\nx = [-1, 1]\ny = [-1, 1]\n[accuracy]\n\
              cells = 6\n[time]\nend = 0.3\nmax_step = 0.05\n[materials.a]\nshear_viscosity = 3\n\
              bulk_viscosity = 2\n[[regions]]\nmaterial = \"a\"\n[boundaries]\n\
-             left = {side}\nright = {side}\nbottom = {side}\ntop = {side}\n"
+             left = {side}\nright = {side}\nbottom = {side}\ntop = {side}\n\
+             [dye]\nmarks = [{{ from = [-1, 0], to = [1, 0], width = 4 }}]\n"
         ),
         &[],
     );
-    let volume = |run: &dyn Run| run.particles().volume.iter().sum::<f64>();
+    let volumes = |run: &dyn Run| {
+        let p = run.particles();
+        let of = |mark: bool| {
+            let own = (0..p.len()).filter(|&k| p.mark.as_ref().unwrap()[k] == mark);
+            own.map(|k| p.volume[k]).sum::<f64>() * run.plan().units.area()
+        };
+        [of(true), of(false)]
+    };
+    // What is in the box at the start is marked, what enters is not.
+    let volume = |run: &dyn Run| volumes(run)[0];
     let first = volume(run.as_ref());
     finish(run.as_mut(), |_| {});
     let expected = (-0.4 * 0.3f64).exp();
     assert!((volume(run.as_ref()) / first / expected - 1.0).abs() < 1e-9);
+    // What enters fills the box.
+    let total: f64 = volumes(run.as_ref()).iter().sum();
+    assert!((total / first - 1.0).abs() < 0.01, "{total} {first}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod effects;
 mod exact;
 mod grains;
 mod inertia;
+mod inflow;
 mod laws;
 mod measure;
 mod openings;

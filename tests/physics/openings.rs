@@ -60,7 +60,7 @@ material = "air"
 
 /// Integral of a component of the velocity along a line with a given other coordinate, exact for
 /// the elements.
-fn flux(run: &dyn Run, c: usize, at: f64, [from, to]: [f64; 2]) -> f64 {
+pub fn flux(run: &dyn Run, c: usize, at: f64, [from, to]: [f64; 2]) -> f64 {
     let plan = run.plan();
     let lines = if c == 0 { plan.mesh.y.lines() } else { plan.mesh.x.lines() };
     let value = |s: f64| run.velocity_at(if c == 0 { [at, s] } else { [s, at] })[c];

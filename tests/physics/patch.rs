@@ -10,7 +10,7 @@ fn patch(boundaries: &str, extra: &str) -> String {
     format!(
         "schema = 1\nname = \"patch\"\n[domain]\nx = [0, 1.3]\ny = [-0.2, 0.7]\n\
          [mesh]\ngrading = [{{ towards = {{ x = 0.4 }}, factor = 5 }}, {{ towards = {{ y = 0.1 }}, factor = 3 }}]\n\
-         [accuracy]\ncells = 5\nplacement = \"random\"\nparticles_per_cell = 9\nseed = 7\n[time]\nend = 1\n\
+         [accuracy]\ncells = 5\nplacement = \"random\"\nparticles_per_cell = 9\nseed = 7\n[time]\nsteady = true\n\
          {extra}\
          [[regions]]\nmaterial = \"a\"\n[[regions]]\nmaterial = \"b\"\n\
          shape.circle = {{ centre = [0.6, 0.2], radius = 0.31 }}\n{boundaries}"

@@ -5,6 +5,7 @@ mod accuracy;
 mod dye;
 mod flow_curves;
 mod gauges;
+mod inflow;
 mod materials;
 mod mesh;
 mod null_spaces;
@@ -25,7 +26,6 @@ pub use schedule::resolve;
 use super::boundary;
 use super::{EffectSet, InitialFields, Method, Plan, Warning};
 use crate::scene::{Field, FieldFn, Scene, SceneError, Scope, is_folder_name};
-use crate::space::shape::side_normal;
 use materials::{SiMatter, thin_fluid};
 use regions::{placed, regions};
 use std::sync::Arc;
@@ -78,17 +78,13 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let walls = Walls::new(scene, scope, domain)?;
     let gauges = gauges::gauges(scene, scope, domain)?;
     gauges::interest(scene)?;
-    let sides = sides::sides(scene, scope, domain)?;
+    let candidates = inflow::Candidates { scene, scope, materials: &si.materials };
+    let sides = sides::sides(scene, scope, domain, candidates)?;
     let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides };
     let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &lines, &units)?);
     state.relaxation = schedule::relaxation(&state, &mesh, schedule::inertial(scene, &units));
     let boundary = boundary::boundary(sides, &walls, &mesh, &units, (&state, scene.inertia))?;
     let enclosure = walls.enclosure(&boundary, &mesh, &units);
-    for (s, piece) in boundary.pieces() {
-        if piece.conditions.passes_through(side_normal(s)) {
-            warnings.push(Warning::ThroughFlow { place: boundary::place_of(s, piece) });
-        }
-    }
 
     let regions = regions(scene, scope, domain, &si, &mut Vec::new())?;
     let has_density = si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some());

@@ -100,15 +100,19 @@ pub(super) fn regions(
 }
 
 /// The scene without the regions below a later one with the shape `everywhere`, and without
-/// materials that then fill no part of the domain and are measured by no gauge, so that no effect
-/// is solved for absent materials.
+/// materials that then fill no part of the domain, enter through no side and are measured by no
+/// gauge, so that no effect is solved for absent materials.
 pub(super) fn placed(scene: &Scene) -> Scene {
     let mut s = scene.clone();
     let everywhere = s.regions.iter().rposition(|r| matches!(r.shape, Shape::Everywhere));
     s.regions.drain(..everywhere.unwrap_or(0));
     let (regions, gauges) = (&s.regions, &s.gauges);
+    let sides = s.boundaries.sides();
+    let enters =
+        |name: &str| sides.iter().flat_map(|b| b.all_given()).any(|g| g.inflow == Some(name));
     s.materials.retain(|name, m| {
         m.background && everywhere.is_none()
+            || enters(name)
             || regions.iter().any(|r| r.material == *name)
             || gauges.iter().any(|g| g.material == *name)
     });

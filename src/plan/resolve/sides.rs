@@ -1,5 +1,6 @@
 //! This module resolves `[boundaries]`: the conditions at the sides of the domain and their parts.
 
+use super::inflow::Candidates;
 use super::values::{Result, coordinate, edge, finite_range};
 use crate::plan::boundary::{Conditions, Piece, SIDES, Side};
 use crate::scene::{
@@ -14,6 +15,7 @@ const SAME: f64 = 1e-9;
 /// A side of the domain whose table is resolved.
 struct Resolver<'a> {
     scope: &'a Scope,
+    candidates: Candidates<'a>,
     /// Number of the side.
     side: usize,
     /// Name such as `boundaries.left`.
@@ -29,6 +31,7 @@ pub(in crate::plan) fn sides(
     scene: &Scene,
     scope: &Scope,
     domain: [[f64; 2]; 2],
+    candidates: Candidates,
 ) -> Result<[Side; 4]> {
     let mut out: [Side; 4] = Default::default();
     for (s, boundary) in scene.boundaries.sides().into_iter().enumerate() {
@@ -37,7 +40,7 @@ pub(in crate::plan) fn sides(
         let [from, to] = place[1 - normal];
         let segment = Segment { normal, at: place[normal][0], from, to };
         let name = format!("boundaries.{}", SIDES[s]);
-        out[s] = Resolver { scope, side: s, name, segment, place }.side(boundary)?;
+        out[s] = Resolver { scope, candidates, side: s, name, segment, place }.side(boundary)?;
     }
     Ok(out)
 }
@@ -65,7 +68,7 @@ impl Resolver<'_> {
         SceneError::join(errors)?;
         parts.sort_by(|a, b| a.segment.from.total_cmp(&b.segment.from));
         self.refuse_overlaps(boundary, &parts)?;
-        Ok(Side { periodic, pieces: self.with_rest(parts, rest, boundary.kind) })
+        Ok(Side { periodic, pieces: self.with_rest(parts, rest, boundary)? })
     }
 
     /// A part of the side.
@@ -108,7 +111,21 @@ impl Resolver<'_> {
         }
         let conditions = self.conditions(part.given(), &name)?;
         let segment = Segment { from, to, ..self.segment };
-        Ok(Piece { part: Some(k), segment, open: self.open(part.kind, &conditions), conditions })
+        self.piece(Some(k), segment, part.given(), conditions)
+    }
+
+    /// A piece of the side with its conditions, which are resolved from `given`.
+    fn piece(
+        &self,
+        part: Option<usize>,
+        segment: Segment,
+        given: Given,
+        conditions: Conditions,
+    ) -> Result<Piece> {
+        let open = self.open(given.kind, &conditions);
+        let mut piece = Piece { part, segment, conditions, open, enters: None };
+        piece.enters = self.candidates.through(self.side, &piece, given)?;
+        Ok(piece)
     }
 
     /// `parts` are in ascending order.
@@ -135,33 +152,35 @@ impl Resolver<'_> {
     }
 
     /// The parts, which are in ascending order, and the rest of the side between them.
-    fn with_rest(&self, parts: Vec<Piece>, rest: Conditions, kind: BoundaryKind) -> Vec<Piece> {
+    fn with_rest(
+        &self,
+        parts: Vec<Piece>,
+        rest: Conditions,
+        boundary: &Boundary,
+    ) -> Result<Vec<Piece>> {
         let tiny = SAME * (self.segment.to - self.segment.from);
-        let open = self.open(kind, &rest);
-        let between = |from: f64, to: f64| Piece {
-            part: None,
-            segment: Segment { from, to, ..self.segment },
-            conditions: rest.clone(),
-            open,
+        let between = |from: f64, to: f64| {
+            let segment = Segment { from, to, ..self.segment };
+            self.piece(None, segment, boundary.given(), rest.clone())
         };
         let mut pieces = Vec::new();
         let mut from = self.segment.from;
         for part in parts {
             if part.segment.from - from > tiny {
-                pieces.push(between(from, part.segment.from));
+                pieces.push(between(from, part.segment.from)?);
             }
             from = part.segment.to;
             pieces.push(part);
         }
         if self.segment.to - from > tiny {
-            pieces.push(between(from, self.segment.to));
+            pieces.push(between(from, self.segment.to)?);
         }
-        pieces
+        Ok(pieces)
     }
 
     /// The conditions that are written for the side or for a part of it, which is called `name`.
     fn conditions(&self, given: Given, name: &str) -> Result<Conditions> {
-        let Given { kind, velocity, traction, rotation } = given;
+        let Given { kind, velocity, traction, rotation, .. } = given;
         if kind == BoundaryKind::Periodic {
             return match velocity.into_iter().chain(traction).chain([rotation]).flatten().next() {
                 None => Ok(Conditions::default()),

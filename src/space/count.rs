@@ -1,0 +1,20 @@
+//! This module defines what is counted of the particles of a run.
+
+/// Numbers of events of particles, accumulated over a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Count {
+    /// Splits of a particle.
+    pub splits: u64,
+    /// Merges of two particles.
+    pub merges: u64,
+    /// Particles stopped at walls that their step would have crossed.
+    pub held: u64,
+    /// Particles that left through an open side.
+    pub left: u64,
+    /// Empty cells that were refilled from a neighbour, except with the background.
+    pub healed: u64,
+    /// Volume per depth (in the plan's units) that entered through sides.
+    pub volume_in: f64,
+    /// Volume per depth (in the plan's units) that left through open sides.
+    pub volume_out: f64,
+}
