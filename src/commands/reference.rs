@@ -383,6 +383,14 @@ material = "sand"
         ("right.parts[0].inflow_director", "boundaries.right.parts[0].inflow=sand"),
         ("bottom.parts[0].inflow_director", "boundaries.bottom.parts[0].inflow=sand"),
         ("top.parts[0].inflow_director", "boundaries.top.parts[0].inflow=sand"),
+        ("sources[0]", "boundaries.top.kind=open"),
+        (
+            "sources[0]",
+            "sources=[{ name = \"spout\", from = [0.75, 0.75], to = [1, 0.75], \
+             material = \"sand\", speed = 0.1 }]",
+        ),
+        ("sources[0].director", "materials.sand.layer_viscosity=1"),
+        ("sources[0].director", "sources[0].director={ angle_degrees = 0 }"),
         ("pressure_reference.value", "pressure_reference.at=[0.5, 0.9]"),
         // The alignment needs directors.
         ("interest.quantity", "materials.sand.layer_viscosity=1"),

@@ -1,5 +1,5 @@
-//! This module lets material enter through the sides of the domain, so that the particles fill the
-//! domain while material is pushed in, or while material leaves it elsewhere.
+//! This module lets material enter through the sides of the domain and through nozzles, so that the
+//! particles fill the domain while material is pushed in, or while material leaves it elsewhere.
 //!
 //! The volume that the velocity carries inwards across a part `F` of a face in a step,
 //!
@@ -22,7 +22,7 @@ use crate::space::shape::{SIDE_NODES, Shape, side_normal};
 /// Pieces of a part of a face that a solid may cover.
 const PIECES: usize = 16;
 
-/// Faces on sides of the domain through which material may enter.
+/// Faces on sides of the domain and of nozzles through which material may enter.
 #[derive(Clone, Debug)]
 pub struct Inflow {
     faces: Vec<Face>,
@@ -36,7 +36,7 @@ pub struct Inflow {
 #[derive(Clone, Copy, Debug)]
 struct Face {
     cell: usize,
-    /// Side of the cell and of the domain.
+    /// Side of the cell.
     side: usize,
     /// Index into [`Inflow::entering`].
     entering: usize,
@@ -49,7 +49,7 @@ struct Entry {
     volume: f64,
     /// Its position at the end of the step.
     at: [f64; 2],
-    /// A point outside the domain from which it came.
+    /// A point on the other side of the face from which it came.
     from: [f64; 2],
     /// Director, viscosity and density that it carries.
     carried: ([f64; 2], [f64; 2]),
@@ -63,13 +63,29 @@ impl Inflow {
             Inflow { faces: vec![], entering: vec![], particles_along: plan.method.seeding.side };
         for (side, piece) in plan.boundary.pieces() {
             let Some(entering) = &piece.enters else { continue };
-            out.entering.push(entering.clone());
-            let entering = out.entering.len() - 1;
             let cells = piece.segment.cells_at_side(mesh, side).map(|(_, cell)| cell);
-            let cells = cells.filter(|&cell| !mesh.solid[cell]);
-            out.faces.extend(cells.map(|cell| Face { cell, side, entering }));
+            out.add_faces(mesh, entering, cells.map(|cell| (cell, side)));
+        }
+        for source in &plan.boundary.sources {
+            let forwards = source.velocity > 0.0;
+            let side = 2 * source.segment.normal + usize::from(!forwards);
+            let cells = source.segment.cells_beside(mesh, forwards);
+            out.add_faces(mesh, &source.entering, cells.map(|cell| (cell, side)));
         }
         (!out.faces.is_empty()).then_some(out)
+    }
+
+    /// Adds faces, which are sides of cells.
+    fn add_faces(
+        &mut self,
+        mesh: &Mesh,
+        entering: &Entering,
+        faces: impl Iterator<Item = (usize, usize)>,
+    ) {
+        self.entering.push(entering.clone());
+        let entering = self.entering.len() - 1;
+        let faces = faces.filter(|&(cell, _)| !mesh.solid[cell]);
+        self.faces.extend(faces.map(|(cell, side)| Face { cell, side, entering }));
     }
 
     /// The cells at the faces through which a material other than `background` may enter.

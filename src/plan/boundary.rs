@@ -2,6 +2,7 @@
 
 use super::resolve::values::Result;
 use super::resolve::walls::{SiBlock, Walls};
+use super::sources::{Entering, Source};
 use super::{Matter, Units};
 use crate::scene::{FieldFn, SceneError, WallKind};
 use crate::space::constraints::Constraints;
@@ -49,15 +50,6 @@ pub struct Piece {
     pub enters: Option<Entering>,
 }
 
-/// What enters through a piece of a side.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Entering {
-    /// Index of the material.
-    pub material: u8,
-    /// Angle between its directors and the x axis, degrees, as a function of SI coordinates.
-    pub director: Option<FieldFn>,
-}
-
 /// A side of the domain.
 #[derive(Clone, Debug, Default)]
 pub struct Side {
@@ -102,6 +94,8 @@ pub struct BoundaryPlan {
     pub sides: [Side; 4],
     /// Walls and sides of blocks.
     pub walls: Vec<WallLine>,
+    /// Nozzles inside the domain; their sides are among `walls`.
+    pub sources: Vec<Source>,
     /// Directions (x, y) in which no boundary condition prevents a rigid translation.
     pub free_translation: [bool; 2],
     /// Whether the pressure is determined only up to a constant.
@@ -136,10 +130,37 @@ impl BoundaryPlan {
         pieces(&self.sides)
     }
 
-    /// Prescribed nodal values. Where boundaries meet, normal velocities take precedence over
-    /// tangential ones.
-    pub fn constraints<const D: usize>(&self, mesh: &Mesh, units: &Units) -> Constraints<D> {
+    /// Prescribed nodal values while the sources are on that `is_on` selects. Which values are
+    /// prescribed does not depend on it.
+    pub fn constraints_with<const D: usize>(
+        &self,
+        mesh: &Mesh,
+        units: &Units,
+        is_on: impl Fn(&Source) -> bool,
+    ) -> Constraints<D> {
         let mut out = Constraints::new(mesh);
+        // The ends of a mouth belong to the mouth.
+        for source in &self.sources {
+            let normal = source.segment.normal;
+            let value = if is_on(source) { source.velocity } else { 0.0 };
+            source.segment.nodes(mesh).for_each(|node| out.fix(node, normal, value));
+        }
+        self.fix(mesh, units, out)
+    }
+
+    /// Prescribed nodal values while all sources are on.
+    pub fn constraints<const D: usize>(&self, mesh: &Mesh, units: &Units) -> Constraints<D> {
+        self.constraints_with(mesh, units, |_| true)
+    }
+
+    /// Adds the values that the sides, walls and blocks prescribe. Where boundaries meet, normal
+    /// velocities take precedence over tangential ones.
+    fn fix<const D: usize>(
+        &self,
+        mesh: &Mesh,
+        units: &Units,
+        mut out: Constraints<D>,
+    ) -> Constraints<D> {
         let sides = self.sides.each_ref().map(Side::most_constraining_first);
         let pieces = || sides.iter().flatten();
         for pass in 0..2 {
@@ -239,6 +260,7 @@ pub(super) fn boundary(
     mesh: &Mesh,
     units: &Units,
     (state, inertia): (&Matter, bool),
+    sources: Vec<Source>,
 ) -> Result<BoundaryPlan> {
     for piece in sides.iter_mut().flat_map(|side| &mut side.pieces) {
         piece.segment = piece.segment.on_mesh(mesh, units.length);
@@ -271,7 +293,15 @@ pub(super) fn boundary(
     let compressible = state.materials.iter().any(|m| m.law.compliance > 0.0);
     let closed = !compressible
         && pieces(&sides).all(|(s, p)| p.conditions.velocity[side_normal(s)].is_some());
-    let mut plan = BoundaryPlan { sides, walls: lines, free_translation, closed, correction: 0.0 };
+    if let Some(source) = sources.first().filter(|_| closed) {
+        return Err(SceneError::of_key(
+            "sources[0]",
+            format!("source `{}` pushes incompressible fluid into a closed domain", source.name),
+            "open a side or a part of one (kind = \"open\" or \"outflow\"), or give a bulk_viscosity",
+        ));
+    }
+    let mut plan =
+        BoundaryPlan { sides, walls: lines, sources, free_translation, closed, correction: 0.0 };
     if closed {
         let (mut net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
         if mesh.parts().is_some() && net != 0.0 && net.abs() < LARGEST_CORRECTION * total {

@@ -1,7 +1,7 @@
 //! This module finds differences between two plans other than values that may change during a run.
 
 use super::material::Material;
-use super::{Entering, Gauge, Matter, Plan, Tracers};
+use super::{Entering, Gauge, Matter, Plan, Source, Tracers};
 use crate::space::parts::Parts;
 
 impl Plan {
@@ -14,7 +14,7 @@ impl Plan {
             (!same_history(&self.state, &other.state), "the kind of a material"),
             (self.initial != other.initial, "the values that particles carry"),
             (supports(self) != supports(other), "the boundaries"),
-            (enters(self) != enters(other), "what enters through the boundaries"),
+            (enters(self) != enters(other), "what enters"),
             (
                 loads(self) != loads(other) || self.acceleration != other.acceleration,
                 "the boundaries' values or the loads",
@@ -45,9 +45,16 @@ fn supports(p: &Plan) -> ([Vec<[f64; 2]>; 4], [bool; 2], bool) {
     (p.enclosure.open.each_ref().map(si), p.boundary.free_translation, p.boundary.closed)
 }
 
-/// What enters through the pieces of the sides.
-fn enters(p: &Plan) -> Vec<Option<&Entering>> {
-    p.boundary.pieces().map(|(_, piece)| piece.enters.as_ref()).collect()
+/// What enters through the pieces of the sides, and the nozzles in SI units.
+fn enters(p: &Plan) -> (Vec<Option<&Entering>>, Vec<Source>) {
+    let u = &p.units;
+    let sources = p.boundary.sources.iter().cloned().map(|s| Source {
+        segment: s.segment.scaled(u.length),
+        velocity: s.velocity * u.velocity(),
+        times: s.times.map(|t| t * u.time),
+        ..s
+    });
+    (p.boundary.pieces().map(|(_, piece)| piece.enters.as_ref()).collect(), sources.collect())
 }
 
 /// Gauges, dye lines and marks in SI units.

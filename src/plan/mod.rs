@@ -15,12 +15,14 @@ pub mod memory;
 mod meshing;
 mod reasons;
 mod resolve;
+pub mod sources;
 pub mod units;
 mod warning;
 
-pub use boundary::{BoundaryPlan, Conditions, Entering, Piece, Side, WallLine};
+pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
 pub use effects::{Effect, EffectKind, EffectList, StepTime};
 pub use resolve::resolve;
+pub use sources::{Entering, Source};
 pub use units::Units;
 pub use warning::Warning;
 
@@ -332,9 +334,9 @@ impl Plan {
         self.state.materials.iter().filter_map(of).reduce(f64::max)
     }
 
-    /// Whether particles may enter or leave through sides.
+    /// Whether particles may enter, or leave through sides.
     pub fn exchanges_volume(&self) -> bool {
-        self.enclosure.is_open()
+        self.enclosure.is_open() || !self.boundary.sources.is_empty()
     }
 
     /// Whether gravity or an acceleration acts on the materials.
@@ -352,7 +354,7 @@ impl Plan {
     pub fn energy_tells(&self) -> bool {
         let (mesh, g) = (&self.mesh, self.state.gravity);
         let along_seam = mesh.x.periodic() && g[0] != 0.0 || mesh.y.periodic() && g[1] != 0.0;
-        let constant = !self.enclosure.is_open() && !self.effects.volume_change;
+        let constant = !self.exchanges_volume() && !self.effects.volume_change;
         (self.effects.gravity || self.effects.inertia) && constant && !along_seam
     }
 

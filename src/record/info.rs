@@ -33,7 +33,8 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         .iter()
         .filter(|w| w.thickness.is_none())
         .map(|w| w.name.clone())
-        .chain(blocks.flat_map(|b| vec![b.name.clone(); 4]));
+        .chain(blocks.flat_map(|b| vec![b.name.clone(); 4]))
+        .chain(plan.boundary.sources.iter().flat_map(|s| vec![s.name.clone(); 4]));
     walls.extend(
         plan.enclosure
             .obstacles

@@ -5,7 +5,7 @@ use super::load::parse;
 use super::source::SceneSource;
 
 /// Names and TOML texts of the presets.
-const PRESETS: [(&str, &str); 15] = [
+const PRESETS: [(&str, &str); 16] = [
     ("silo", include_str!("../../presets/silo.toml")),
     ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
     ("couette_cosserat", include_str!("../../presets/couette_cosserat.toml")),
@@ -21,6 +21,7 @@ const PRESETS: [(&str, &str); 15] = [
     ("column_collapse", include_str!("../../presets/column_collapse.toml")),
     ("incline", include_str!("../../presets/incline.toml")),
     ("bingham_slump", include_str!("../../presets/bingham_slump.toml")),
+    ("pour", include_str!("../../presets/pour.toml")),
 ];
 
 /// Names and one-line descriptions of the presets, in display order.

@@ -11,7 +11,7 @@ use super::source::SceneSource;
 use crate::words::count;
 
 /// The keys of a scene with which a path may start.
-const KEYS: [&str; 24] = [
+const KEYS: [&str; 25] = [
     "schema",
     "name",
     "description",
@@ -28,6 +28,7 @@ const KEYS: [&str; 24] = [
     "boundaries",
     "walls",
     "blocks",
+    "sources",
     "pressure_reference",
     "body_force",
     "acceleration",

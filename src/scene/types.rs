@@ -63,6 +63,9 @@ pub struct Scene {
     /// Solid rectangles inside the domain.
     #[serde(default)]
     pub blocks: Vec<Block>,
+    /// Nozzles inside the domain that push material in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<Source>,
     /// Pressure at a point, where the boundaries determine it only up to a constant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure_reference: Option<PressureReference>,
@@ -880,6 +883,57 @@ pub struct Block {
     #[serde(default)]
     #[schemars(extend("examples" = ["no_slip"]))]
     pub kind: WallKind,
+}
+
+/// A nozzle: a solid block, one cell thick, that pushes material in through one of its faces. An
+/// incompressible fluid must be able to leave the domain elsewhere.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// Name of the source.
+    #[schemars(extend("examples" = ["spout"]))]
+    pub name: String,
+    /// Coordinates x and y of one end of the mouth of the nozzle.
+    #[schemars(extend("x-unit" = "m", "x-range" = "in the domain", "examples" = [[0.75, 0.75]]))]
+    pub from: [Quantity; 2],
+    /// Coordinates x and y of the other end of the mouth.
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain; `x` or `y` as in `from`",
+        "examples" = [[1, 0.75]]
+    ))]
+    pub to: [Quantity; 2],
+    /// Name of the material that enters.
+    #[schemars(extend("x-range" = "a material", "examples" = ["sand"]))]
+    pub material: String,
+    /// Speed with which it enters, the same along the mouth.
+    #[schemars(extend("x-unit" = "m/s", "x-range" = "> 0", "examples" = [0.5]))]
+    pub speed: Quantity,
+    /// Direction in which it enters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "across the mouth",
+        "x-default" = "`\"down\"` or `\"left\"`",
+        "examples" = ["down"]
+    ))]
+    pub direction: Option<Direction>,
+    /// Directors of the material; required for a layered material.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "none", "examples" = [{ "angle_degrees": 45 }]))]
+    pub director: Option<InflowDirector>,
+    /// Time at which the source begins.
+    #[serde(default = "zero")]
+    #[schemars(extend("x-unit" = "s", "x-range" = "≥ 0", "examples" = [0.5]))]
+    pub from_time: Quantity,
+    /// Time at which the source ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "s",
+        "x-range" = "> `from_time`",
+        "x-default" = "never",
+        "examples" = [4]
+    ))]
+    pub to_time: Option<Quantity>,
 }
 
 /// Velocity at the start of a scene with inertia. Its part with divergence is removed.

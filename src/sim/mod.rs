@@ -31,6 +31,7 @@ mod saving;
 mod simulation;
 pub mod snapshot;
 mod solution;
+mod sources;
 pub mod state;
 mod step;
 mod yielding;

@@ -310,6 +310,7 @@ impl<const D: usize> Simulation<D> {
         self.count = Count { splits, merges, held, left, healed, volume_in, volume_out };
         (self.step, self.version, self.next_change) = (step, version, next_change as usize);
         self.time = time;
+        self.switch_sources();
         self.tolerated = tolerated;
         self.first_energy = first_energy;
         self.flowed = flowed;

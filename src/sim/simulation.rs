@@ -7,6 +7,7 @@ use super::initial;
 use super::interest::Interest;
 use super::phases::Phases;
 use super::row::Row;
+use super::sources;
 use crate::motion::advect::Displacements;
 use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
@@ -74,6 +75,8 @@ pub struct Simulation<const D: usize> {
     /// Index of the next scheduled change.
     pub(super) next_change: usize,
     pub(super) population: Population,
+    /// Which of the plan's sources are on.
+    pub(super) sources_on: Vec<bool>,
     /// Faces through which material enters, if there are any.
     pub(super) inflow: Option<Inflow>,
     pub(super) gauges: Vec<Counter>,
@@ -120,8 +123,8 @@ impl<const D: usize> Simulation<D> {
     pub fn new(plan: Arc<Plan>) -> Result<Self, SimError> {
         let clock = Instant::now();
         let mesh = plan.mesh.clone();
-        let mut constraints = plan.boundary.constraints::<D>(&mesh, &plan.units);
-        constraints.refer(plan.pressure_reference);
+        let sources_on = sources::on(&plan, 0.0);
+        let constraints = sources::constraints::<D>(&plan, &sources_on);
         let mut quadrature =
             Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len());
         quadrature.bind_walls(|cell| constraints.fixed_sides(&mesh, cell));
@@ -167,6 +170,7 @@ impl<const D: usize> Simulation<D> {
             next_change: 0,
             population,
             inflow: Inflow::new(&plan),
+            sources_on,
             gauges: plan.gauges.iter().cloned().map(Counter::new).collect(),
             dye: plan.tracers.as_ref().map(DyeLines::new),
             count: Count::default(),

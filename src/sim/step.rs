@@ -269,7 +269,8 @@ impl<const D: usize> Simulation<D> {
         next.clamp(LARGEST_FALL * dt, longest)
     }
 
-    /// Applies the scheduled changes that are due, and returns whether there were any.
+    /// Applies the scheduled changes that are due, switches sources, and returns whether anything
+    /// changed.
     pub(super) fn apply_changes(&mut self) -> bool {
         self.events.clear();
         let mut any = false;
@@ -292,7 +293,7 @@ impl<const D: usize> Simulation<D> {
             self.next_change += 1;
             any = true;
         }
-        any
+        self.switch_sources() || any
     }
 
     /// Time ahead for which restoring loads are computed, for a step of length `dt`; `None` without

@@ -71,6 +71,11 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
+    /// Changes the prescribed values; the same unknowns must be prescribed as before.
+    pub fn prescribe(&mut self, constraints: Constraints<D>) {
+        self.constraints = constraints;
+    }
+
     /// Number of velocity and rotation unknowns, including condensed ones.
     pub fn unknowns(&self) -> usize {
         self.mesh.nodes() * D

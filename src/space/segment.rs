@@ -66,6 +66,21 @@ impl Segment {
         })
     }
 
+    /// Cells on one side of the segment, which lies on mesh lines inside the mesh: those above or to
+    /// the right of it, or the others.
+    pub fn cells_beside<'a>(
+        &self,
+        mesh: &'a Mesh,
+        above: bool,
+    ) -> impl Iterator<Item = usize> + use<'a> {
+        let (across, along) = mesh.axes(self.normal);
+        let normal = self.normal;
+        let line = across.nearest_line(self.at);
+        let cell = if above { line } else { line.saturating_sub(1) };
+        let [from, to] = [self.from, self.to].map(|v| along.nearest_line(v));
+        (from..to).map(move |k| mesh.cell_across(normal, cell, k))
+    }
+
     /// Cells along the segment, which lies on a side of the mesh and ends on mesh lines, with their
     /// indices along the side.
     pub fn cells_at_side<'a>(

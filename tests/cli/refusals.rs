@@ -236,6 +236,45 @@ const FAULTS: &[Fault] = &[
         &["boundaries.left lets in the layered material `mud` without", "inflow_director = {"],
     ),
     (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[sources]]\nname = \"spout\"\nmaterial = \"sand\"\nfrom = [0.75, 0.5]\nto = [1.25, 0.5]\nspeed = 1\n[[walls]]\nname = \"left_wall\"",
+        "",
+        &["source `spout` pushes incompressible fluid into a closed domain", "open a side"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[sources]]\nname = \"spout\"\nmaterial = \"sand\"\nfrom = [0.75, 1]\nto = [1.25, 0.95]\nspeed = 1\n[[walls]]\nname = \"left_wall\"",
+        "1.25",
+        &["source `spout` is slanted"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[sources]]\nname = \"spout\"\nmaterial = \"sand\"\nfrom = [0.75, 0.875]\nto = [1.25, 0.875]\nspeed = 1\n[[walls]]\nname = \"left_wall\"",
+        "0.875]\nto",
+        &[
+            "less than a cell between its mouth and the top side",
+            "[[boundaries.top.parts]] with velocity_y and inflow",
+        ],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[sources]]\nname = \"spout\"\nmaterial = \"sand\"\nfrom = [0.75, 0.5]\nto = [1.25, 0.5]\nspeed = 0.0\n[[walls]]\nname = \"left_wall\"",
+        "0.0",
+        &["source `spout`: speed is 0", "above zero"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[sources]]\nname = \"spout\"\nmaterial = \"sand\"\nfrom = [0.75, 0.5]\nto = [1.25, 0.5]\nspeed = 1\ndirection = \"left\"\n[[walls]]\nname = \"left_wall\"",
+        "",
+        &["source `spout`: its direction runs along its mouth", "`up` or `down`"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[sources]]\nname = \"spout\"\nmaterial = \"sand\"\nfrom = [0.75, 0.5]\nto = [1.25, 0.5]\nspeed = 1\nfrom_time = 3\nto_time = 2.5\n[[walls]]\nname = \"left_wall\"",
+        "2.5",
+        &["source `spout` ends at 2.5 s, before it begins at 3 s"],
+    ),
+    (
         "bottom.kind = \"free_slip\"",
         "bottom.parts = [{ from = 0.5, to = 1 }]",
         "",

@@ -14,6 +14,7 @@ mod order;
 mod patch;
 mod rest;
 mod solids;
+mod sources;
 mod steps;
 mod verification;
 

@@ -3,8 +3,10 @@
 use super::materials::{SiMaterial, material_index};
 use super::values::{Result, finite_range};
 use crate::plan::Piece;
-use crate::plan::boundary::{Entering, place_of};
-use crate::scene::{FieldFn, Given, Scene, SceneError, Scope};
+use crate::plan::boundary::place_of;
+use crate::plan::sources::Entering;
+use crate::scene::{FieldFn, Given, InflowDirector, Scene, SceneError, Scope};
+use crate::space::segment::Segment;
 use crate::space::shape::side_normal;
 
 /// Number of intervals along a piece between points at which its velocity is evaluated.
@@ -50,7 +52,9 @@ impl Candidates<'_> {
                 (Some(m), None) if self.has_layers(m) && given.inflow_director.is_none() => {
                     Ok(None)
                 }
-                (Some(m), _) => self.entering(m, (&name, piece), given).map(Some),
+                (Some(m), _) => self
+                    .entering(m, &piece.segment, (&name, &name), given.inflow_director)
+                    .map(Some),
             };
         };
         let place = format!("{name}.inflow");
@@ -58,31 +62,32 @@ impl Candidates<'_> {
         let material = material_index(&self.scene.materials, wanted, &name, &place)?;
         if !piece.open && given.velocity[normal].is_none() {
             return Err(SceneError::of_key(
-                place,
+                &place,
                 format!("{name} lets nothing in: its velocity_{letter} is zero"),
                 format!("give velocity_{letter} = <m/s> or kind = \"open\", or remove inflow"),
             ));
         }
         if inwards.is_some_and(|v| v < 0.0) {
             return Err(SceneError::of_key(
-                place,
+                &place,
                 format!("{name} lets nothing in: its velocity_{letter} points outwards"),
                 format!("change the sign of velocity_{letter}, or remove inflow"),
             ));
         }
-        self.entering(material, (&name, piece), given).map(Some)
+        self.entering(material, &piece.segment, (&name, &place), given.inflow_director).map(Some)
     }
 
-    /// A material that enters through the piece called `name`, with its directors.
-    fn entering(
+    /// A material that enters through a segment (m). `what`: the name of the segment, and the key at
+    /// which directors are missing.
+    pub(super) fn entering(
         &self,
         material: u8,
-        (name, piece): (&str, &Piece),
-        given: Given,
+        segment: &Segment,
+        (what, key): (&str, &str),
+        director: Option<&InflowDirector>,
     ) -> Result<Entering> {
-        let called = &self.materials[usize::from(material)].name;
-        let [a, b] = piece.segment.ends();
-        let director = given.inflow_director.map(|d| -> Result<FieldFn> {
+        let [a, b] = segment.ends();
+        let director = director.map(|d| -> Result<FieldFn> {
             let compiled = d.angle_degrees.compile(self.scope)?;
             let place = [[a[0], b[0]], [a[1], b[1]]];
             finite_range(&d.angle_degrees, &compiled, place, "the director's angle")?;
@@ -90,11 +95,12 @@ impl Candidates<'_> {
         });
         let director = director.transpose()?;
         if director.is_none() && self.has_layers(material) {
-            let place = if given.inflow.is_some() { format!("{name}.inflow") } else { name.into() };
+            let called = &self.materials[usize::from(material)].name;
+            let word = if key.starts_with("sources") { "director" } else { "inflow_director" };
             return Err(SceneError::of_key(
-                place,
-                format!("{name} lets in the layered material `{called}` without directors"),
-                "give inflow_director = { angle_degrees = 90 } there",
+                key,
+                format!("{what} lets in the layered material `{called}` without directors"),
+                format!("give {word} = {{ angle_degrees = 90 }} there"),
             ));
         }
         Ok(Entering { material, director: director.filter(|_| self.has_layers(material)) })

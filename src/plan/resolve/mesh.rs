@@ -1,6 +1,7 @@
 //! This module resolves `[domain]`, `[mesh]` and `accuracy.cells` into the mesh.
 
 use super::gauges::SiGauge;
+use super::sources::SiSource;
 use super::values::{Result, coordinate};
 use super::walls::Walls;
 use crate::plan::Units;
@@ -22,6 +23,7 @@ pub(super) struct Lines<'a> {
     pub(super) walls: &'a Walls,
     pub(super) gauges: &'a [SiGauge],
     pub(super) sides: &'a [Side; 4],
+    pub(super) sources: &'a [SiSource],
 }
 
 /// Makes the mesh: lines on all required coordinates, graded towards the edges of apertures.
@@ -30,7 +32,7 @@ pub(super) fn mesh(
     scope: &Scope,
     domain: [[f64; 2]; 2],
     length: f64,
-    &Lines { walls, gauges, sides }: &Lines,
+    &Lines { walls, gauges, sides, sources }: &Lines,
     units: &Units,
 ) -> Result<Mesh> {
     if scene.accuracy.cells == 0 {
@@ -65,6 +67,13 @@ pub(super) fn mesh(
         for c in 0..2 {
             b.range[c].iter().for_each(|&v| demand(c, v, &format!("block `{}`", b.name), false));
         }
+    }
+    for s in sources {
+        let owner = format!("source `{}`", s.name);
+        s.block
+            .iter()
+            .enumerate()
+            .for_each(|(c, r)| r.iter().for_each(|&v| demand(c, v, &owner, false)));
     }
     for g in gauges {
         let owner = format!("gauge `{}`", g.name);

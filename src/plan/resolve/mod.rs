@@ -17,6 +17,7 @@ mod rotation;
 mod scales;
 mod schedule;
 mod sides;
+mod sources;
 mod time;
 pub(super) mod values;
 pub(super) mod walls;
@@ -25,7 +26,7 @@ pub use schedule::resolve;
 
 use super::boundary;
 use super::{EffectSet, InitialFields, Method, Plan, Warning};
-use crate::scene::{Field, FieldFn, Scene, SceneError, Scope, is_folder_name};
+use crate::scene::{Field, FieldFn, Scene, SceneError, Scope, WallKind, is_folder_name};
 use materials::{SiMatter, thin_fluid};
 use regions::{placed, regions};
 use std::sync::Arc;
@@ -75,15 +76,22 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let mut state = si.matter(&units);
     warnings.extend(si.warnings.iter().cloned());
 
-    let walls = Walls::new(scene, scope, domain)?;
+    let mut walls = Walls::new(scene, scope, domain)?;
     let gauges = gauges::gauges(scene, scope, domain)?;
     gauges::interest(scene)?;
     let candidates = inflow::Candidates { scene, scope, materials: &si.materials };
     let sides = sides::sides(scene, scope, domain, candidates)?;
-    let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides };
+    let size = length / f64::from(scene.accuracy.cells.max(1));
+    let sources = sources::sources(candidates, domain, size)?;
+    walls.blocks.extend(sources.iter().map(|s| (s.block, WallKind::NoSlip)));
+    let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides, sources: &sources };
     let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &lines, &units)?);
     state.relaxation = schedule::relaxation(&state, &mesh, schedule::inertial(scene, &units));
-    let boundary = boundary::boundary(sides, &walls, &mesh, &units, (&state, scene.inertia))?;
+    let sources: Vec<_> = sources.into_iter().map(|s| s.scaled(&mesh, &units)).collect();
+    let mut clock = time::clock(scene, scope, &units)?;
+    sources::add_stops(&sources, &mut clock);
+    let held = (&state, scene.inertia);
+    let boundary = boundary::boundary(sides, &walls, &mesh, &units, held, sources)?;
     let enclosure = walls.enclosure(&boundary, &mesh, &units);
 
     let regions = regions(scene, scope, domain, &si, &mut Vec::new())?;
@@ -175,7 +183,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
                 .filter(|&share| share > 0.0 && effects.gravity && !effects.inertia),
             ..accuracy::method(scene)?
         },
-        clock: time::clock(scene, scope, &units)?,
+        clock,
         content: recording::content(scene, &mesh)?,
         effects,
         warnings,

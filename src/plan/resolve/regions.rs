@@ -100,16 +100,18 @@ pub(super) fn regions(
 }
 
 /// The scene without the regions below a later one with the shape `everywhere`, and without
-/// materials that then fill no part of the domain, enter through no side and are measured by no
+/// materials that then fill no part of the domain, enter nowhere and are measured by no
 /// gauge, so that no effect is solved for absent materials.
 pub(super) fn placed(scene: &Scene) -> Scene {
     let mut s = scene.clone();
     let everywhere = s.regions.iter().rposition(|r| matches!(r.shape, Shape::Everywhere));
     s.regions.drain(..everywhere.unwrap_or(0));
     let (regions, gauges) = (&s.regions, &s.gauges);
-    let sides = s.boundaries.sides();
-    let enters =
-        |name: &str| sides.iter().flat_map(|b| b.all_given()).any(|g| g.inflow == Some(name));
+    let (sides, sources) = (s.boundaries.sides(), &s.sources);
+    let enters = |name: &str| {
+        sides.iter().flat_map(|b| b.all_given()).any(|g| g.inflow == Some(name))
+            || sources.iter().any(|s| s.material == name)
+    };
     s.materials.retain(|name, m| {
         m.background && everywhere.is_none()
             || enters(name)

@@ -41,6 +41,9 @@ pub(super) fn choose_units(
             }
         }
     }
+    for source in &scene.sources {
+        rate = rate.max(source.speed.eval(scope)?.abs() / length);
+    }
     if let Some(f) = &scene.body_force {
         rate = rate.max(largest(&f.x, domain)?.max(largest(&f.y, domain)?) * length / viscosity);
         rate = rate.max(largest(&f.couple, domain)? / viscosity);
