@@ -31,7 +31,7 @@ use materials::{SiMatter, thin_fluid};
 use regions::{placed, regions};
 use std::sync::Arc;
 use values::{Result, finite_range, middle, positive, ranges};
-use walls::Walls;
+use walls::{SiBlock, Walls};
 
 /// Resolves a scene as if its schedule were empty.
 fn without_schedule(scene: &Scene) -> Result<Plan> {
@@ -83,7 +83,11 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let sides = sides::sides(scene, scope, domain, candidates)?;
     let size = length / f64::from(scene.accuracy.cells.max(1));
     let sources = sources::sources(candidates, domain, size)?;
-    walls.blocks.extend(sources.iter().map(|s| (s.block, WallKind::NoSlip)));
+    walls.blocks.extend(sources.iter().map(|s| SiBlock {
+        name: s.name.clone(),
+        range: s.block,
+        kind: WallKind::NoSlip,
+    }));
     let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides, sources: &sources };
     let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &lines, &units)?);
     state.relaxation = schedule::relaxation(&state, &mesh, schedule::inertial(scene, &units));
