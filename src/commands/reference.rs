@@ -360,6 +360,7 @@ material = "sand"
             "regions[0].shape.circle",
             "regions[0].shape={ circle = { centre = [1, 0.5], radius = 1 } }",
         ),
+        ("regions[0].shape.polygon", "regions[0].shape={ polygon = [[0, 0], [1, 0], [0, 1]] }"),
         ("regions[0].shape.where", "regions[0].shape={ where = \"1\" }"),
         ("regions[0].director.angle", "regions[0].director={ angle_degrees = 0 }"),
         ("boundaries.left", "boundaries.right.kind=open"),
@@ -422,13 +423,28 @@ material = "sand"
         }
     }
 
+    /// The shape of the block in which a key can be set.
+    fn solid(path: &str) -> &'static str {
+        if path.contains("circle") {
+            "shape = { circle = { centre = [1.5, 0.2], radius = 0.1 } }\n"
+        } else if path.contains("polygon") {
+            "shape = { polygon = [[1.5, 0], [2, 0], [2, 0.25]] }\n"
+        } else {
+            "shape = { rectangle = { x = [1.5, 2], y = [0, 0.25] } }\n"
+        }
+    }
+
     /// The box with a value at a path.
     fn with(path: &str, value: &str) -> SceneSource {
         let set = |s: SceneSource, set: String| match s.with_sets(&[set]) {
             Ok(s) => SceneSource::new("box", s.text()),
             Err(e) => panic!("{path}: {}", e.one_line()),
         };
-        let base = SceneSource::new("box", SCENE.replace("MATTER", matter(path)));
+        let mut text = SCENE.replace("MATTER", matter(path));
+        if path.starts_with("blocks[0].shape") {
+            text = text.replace("x = [1.5, 2]\ny = [0, 0.25]\n", solid(path));
+        }
+        let base = SceneSource::new("box", text);
         let needed = NEEDED.iter().filter(|(part, _)| path.contains(part));
         let base = needed.fold(base, |s, (_, needed)| set(s, needed.to_string()));
         set(base, format!("{path}={value}"))

@@ -5,7 +5,7 @@ use crate::frame::{
 };
 use crate::plan::Plan;
 use crate::plan::boundary::SIDES;
-use crate::scene::{Block, ColourBy, FieldName, Shape, scene_hash, to_toml};
+use crate::scene::{Block, ColourBy, FieldName, SolidShape, scene_hash, to_toml};
 use crate::sim::row::{Panel, Place, Row, places};
 use crate::space::segment::Segment;
 
@@ -25,7 +25,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         .filter(|(s, piece)| plan.boundary.sides[*s].pieces.len() == 1 || !piece.open)
         .map(|(s, piece)| Outline { name: SIDES[s].into(), points: ends(&piece.segment) })
         .collect();
-    let aligned = |b: &&Block| matches!(b.shape, None | Some(Shape::Rectangle { .. }));
+    let aligned = |b: &&Block| matches!(b.shape, None | Some(SolidShape::Rectangle { .. }));
     let blocks = plan.scene.blocks.iter().filter(aligned);
     let names = plan
         .scene

@@ -845,6 +845,54 @@ pub enum WallKind {
     NoSlip,
 }
 
+/// Shape of a solid.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SolidShape {
+    /// An axis-aligned rectangle.
+    #[schemars(extend("examples" = [{ "x": [0, 1], "y": [0, 0.5] }]))]
+    Rectangle {
+        /// Range along x: lower and upper end.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "in the domain; ascending",
+            "examples" = [[0, 1]]
+        ))]
+        x: [Quantity; 2],
+        /// Range along y: lower and upper end.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "in the domain; ascending",
+            "examples" = [[0, "height/2"]]
+        ))]
+        y: [Quantity; 2],
+    },
+    /// A polygon: its corners, in order, each as `[x, y]`.
+    Polygon(
+        /// Corners in the order of the outline.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "three or more; the outline must not cross itself",
+            "examples" = [[[0, 0], [1, 0], [0.5, 1]]]
+        ))]
+        Vec<[Quantity; 2]>,
+    ),
+    /// A circle.
+    #[schemars(extend("examples" = [{ "centre": [0.5, 0.5], "radius": 0.25 }]))]
+    Circle {
+        /// Coordinates x and y of the centre.
+        #[schemars(extend(
+            "x-unit" = "m",
+            "x-range" = "any; the circle must touch the domain",
+            "examples" = [[0.5, 0.5]]
+        ))]
+        centre: [Quantity; 2],
+        /// Radius.
+        #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "examples" = [0.25]))]
+        radius: Quantity,
+    },
+}
+
 /// A solid inside the domain: a rectangle along mesh lines (`x` and `y`) or any shape.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -878,7 +926,7 @@ pub struct Block {
         "x-default" = "given by `x` and `y`",
         "examples" = [{ "polygon": [[0, 0], [0.5, 0], [0, 0.5]] }]
     ))]
-    pub shape: Option<Shape>,
+    pub shape: Option<SolidShape>,
     /// Kind of boundary condition on its faces.
     #[serde(default)]
     #[schemars(extend("examples" = ["no_slip"]))]

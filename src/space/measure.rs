@@ -67,6 +67,11 @@ impl CellMeasure {
         self.size[0] * self.size[1] * self.depth
     }
 
+    /// Area of a side whose normal has the direction `c`.
+    pub fn of_side(&self, c: usize) -> f64 {
+        self.size[1 - c] * self.depth
+    }
+
     /// Volume of an integration point with the given weight (the weights of a cell add up to 1).
     #[inline(always)]
     pub fn of_point(&self, weight: f64) -> f64 {

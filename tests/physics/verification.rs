@@ -61,6 +61,10 @@ fn flow_curves() {
 fn inertia() {
     check("inertia");
 }
+#[test]
+fn solids() {
+    check("solids");
+}
 
 #[test]
 fn every_subject_is_tested() {

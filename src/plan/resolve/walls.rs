@@ -4,7 +4,7 @@
 use super::outlines;
 use super::values::{Result, point, positive, ranges};
 use crate::plan::{BoundaryPlan, Units};
-use crate::scene::{Block, Quantity, Scene, SceneError, Scope, Shape, Wall, WallKind};
+use crate::scene::{Block, Quantity, Scene, SceneError, Scope, SolidShape, Wall, WallKind};
 use crate::space::mesh::Mesh;
 use crate::space::outline::Outline;
 use crate::space::segment::Segment;
@@ -198,20 +198,13 @@ fn resolved(b: &Block, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Resolved>
         Ok(Resolved::Solid(SiSolid { name: name.clone(), outline, kind }))
     };
     let (x, y) = match (&b.x, &b.y, &b.shape) {
-        (Some(x), Some(y), None) | (None, None, Some(Shape::Rectangle { x, y })) => (x, y),
-        (None, None, Some(Shape::Polygon(corners))) => {
+        (Some(x), Some(y), None) | (None, None, Some(SolidShape::Rectangle { x, y })) => (x, y),
+        (None, None, Some(SolidShape::Polygon(corners))) => {
             let outline = outlines::polygon(corners, &what, scope)?;
             return solid(outline, &corners[0][0]);
         }
-        (None, None, Some(Shape::Circle { centre, radius })) => {
+        (None, None, Some(SolidShape::Circle { centre, radius })) => {
             return solid(outlines::circle(centre, radius, &what, scope)?, &centre[0]);
-        }
-        (None, None, Some(Shape::Everywhere | Shape::Where(_))) => {
-            return Err(SceneError::of_key(
-                "blocks",
-                format!("the shape of {what} is neither a rectangle, a polygon nor a circle"),
-                "give shape.polygon = [[x, y], ...] or shape.circle = { centre, radius }",
-            ));
         }
         _ => {
             return Err(SceneError::of_key(

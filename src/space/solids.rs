@@ -1,0 +1,264 @@
+//! This module puts solids of any shape into a mesh: finds the cells that are solid and the free parts
+//! of those that are cut.
+
+use super::free_rule::{SQUARES, Weighted, reduced, rule, side_rule};
+use super::measure::CellMeasure;
+use super::mesh::Mesh;
+use super::outline::Point;
+use super::parts::{Part, PartPoint, Parts, Solid};
+use super::shape::{NODES, SIDE_NODES, Shape, side_normal};
+use super::stream_fit::fit;
+use std::sync::Arc;
+
+/// Free fraction up to which a cell is solid.
+const SOLID: f64 = 1e-7;
+
+/// Fraction of a cell up to which solids in it are ignored.
+const WHOLE: f64 = 1e-9;
+
+/// Part of the side of a cell up to which what is given on it is taken as constant.
+const NARROW: f64 = 0.05;
+
+/// Distance, in cells, by which a point of a solid must lie inside of it, and outside of the
+/// solid that the nodes see, for the solid to be thinner than the mesh can show.
+const LOST: f64 = 0.02;
+
+impl Mesh {
+    /// The mesh with solids of any shape in it: marks the cells inside of them as solid and finds the
+    /// free parts of those that they cut.
+    pub fn with_solids(mut self, solids: Vec<Solid>) -> Mesh {
+        if solids.is_empty() {
+            return self;
+        }
+        let mut parts = Parts { solids, cells: vec![None; self.cells()] };
+        for cell in 0..self.cells() {
+            if self.solid[cell] {
+                continue;
+            }
+            let [hx, hy] = self.cell_size(cell);
+            let distance = parts.distance(self.cell_centre(cell));
+            if distance > 0.51 * hx.hypot(hy) {
+                continue;
+            }
+            if distance < -0.51 * hx.hypot(hy) {
+                self.solid[cell] = true;
+                continue;
+            }
+            let middle = [&self.x, &self.y].map(|axis| 0.5 * (axis.start() + axis.end()));
+            let centre = self.cell_centre(cell);
+            let flipped = [0, 1].map(|c| centre[c] > middle[c]);
+            let distance = |r: Point| parts.distance(self.from_reference(cell, r));
+            let rule = rule(flipped, distance);
+            let fraction: f64 = rule.iter().map(|(_, w)| w).sum();
+            let unresolved = is_lost(&self, cell, &parts);
+            if fraction <= SOLID {
+                self.solid[cell] = true;
+            } else if fraction < 1.0 - WHOLE || unresolved {
+                let sides = std::array::from_fn(|side| side_rule(side, distance));
+                let measure = self.measure().of_cell(self.cell_size(cell));
+                let part = part(measure, (fraction, rule), &sides, unresolved);
+                parts.cells[cell] = Some(Box::new(part));
+            }
+        }
+        let cut: Vec<usize> = parts.all().map(|(cell, _)| cell).collect();
+        for cell in cut {
+            let beside = self.free_neighbours(&parts, cell);
+            let stream = parts.of(cell).and_then(|part| fit(&self, cell, part, &parts));
+            if let Some(part) = &mut parts.cells[cell] {
+                (part.beside, part.stream) = (beside, stream.map(Box::new));
+            }
+        }
+        self.parts = Some(Arc::new(parts));
+        self
+    }
+
+    /// Rate at which the volume in the free part of a cell grows with the given nodal velocities,
+    /// `integral div u`.
+    pub fn volume_rate(&self, cell: usize, velocity: impl Fn(usize) -> Point) -> f64 {
+        if self.solid[cell] {
+            return 0.0;
+        }
+        let u = self.cell_nodes(cell).map(velocity);
+        if let Some(part) = self.part(cell) {
+            let [x, y] = &part.divergence[0];
+            return (0..NODES).map(|a| x[a] * u[a][0] + y[a] * u[a][1]).sum();
+        }
+        const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
+        let through = |side: usize| {
+            let c = side_normal(side);
+            let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
+            let nodes = SIDE_NODES[side].iter().zip(SIMPSON);
+            sign * self.face_area(cell, c) * nodes.map(|(&a, w)| w * u[a][c]).sum::<f64>()
+        };
+        (0..4).map(through).sum()
+    }
+
+    /// Value at a node of a side (normal along `normal`) of a velocity that is given along the side. At a
+    /// node inside of a solid it is the continuation of the values beside the solid, of
+    /// `velocity / distance` where the velocity vanishes on the solid.
+    pub fn continued(&self, node: usize, normal: usize, value: impl Fn(Point) -> f64) -> f64 {
+        let at = self.node_position(node);
+        let Some(parts) = self.parts() else { return value(at) };
+        let (solid, inside) = match parts.nearest(at) {
+            Some((solid, d)) if d < 0.0 => (solid, d),
+            _ => return value(at),
+        };
+        let (_, along) = self.axes(normal);
+        let line = along.nearest_line(at[1 - normal]);
+        let near = |line: usize| {
+            let mut p = at;
+            p[1 - normal] = *along.lines().get(line)?;
+            let d = parts.distance(p);
+            (d > 0.0).then_some((p, d))
+        };
+        let beside = [line.checked_sub(1).and_then(near), near(line + 1)];
+        let Some((free, d)) = beside.into_iter().flatten().max_by(|a, b| a.1.total_cmp(&b.1))
+        else {
+            return 0.0;
+        };
+        // The outline is at the fraction `t` of the way to the node, and one point is halfway there.
+        let t = d / (d - inside);
+        let halfway = [0, 1].map(|c| free[c] + 0.5 * t * (at[c] - free[c]));
+        let scale = |d: f64| if solid.no_slip { d } else { 1.0 };
+        let [first, second] =
+            [(free, d), (halfway, parts.distance(halfway))].map(|(p, d)| value(p) / scale(d));
+        let slope = if t > NARROW { (second - first) / (0.5 * t) } else { 0.0 };
+        let start = if t > NARROW { first } else { second };
+        (start + slope) * scale(inside)
+    }
+
+    /// A place in the free part of a cell: its centroid or the integration point nearest to it.
+    pub fn free_place(&self, cell: usize, part: &Part) -> Point {
+        let centroid = part.centroid();
+        let is_free = |r: Point| !self.is_solid_in(cell, self.from_reference(cell, r));
+        if is_free(centroid) {
+            return self.from_reference(cell, centroid);
+        }
+        let away = |r: Point| (r[0] - centroid[0]).hypot(r[1] - centroid[1]);
+        let points = part.points.iter().filter(|p| p.weight > 0.0).map(|p| p.r);
+        let free = points.filter(|&r| is_free(r));
+        let nearest = free.min_by(|&a, &b| away(a).total_cmp(&away(b)));
+        self.from_reference(cell, nearest.unwrap_or(centroid))
+    }
+
+    /// Whether two neighbours share a face.
+    fn share_face(&self, a: usize, b: usize) -> bool {
+        let ((i, j), (k, l)) = (self.cell_ij(a), self.cell_ij(b));
+        (i == k) != (j == l)
+    }
+
+    /// The neighbours of a cell without solids, those across a face if there are any.
+    fn free_neighbours(&self, parts: &Parts, cell: usize) -> Vec<usize> {
+        let free = |n: &usize| *n != cell && !self.solid[*n] && parts.of(*n).is_none();
+        let all: Vec<usize> = self.block(cell).filter(free).collect();
+        let faces: Vec<usize> = all.iter().copied().filter(|&n| self.share_face(cell, n)).collect();
+        if faces.is_empty() { all } else { faces }
+    }
+}
+
+/// Whether the nodes of a cell cannot show a solid in it: the biquadratic function with their
+/// distances is positive where the solid is.
+fn is_lost(mesh: &Mesh, cell: usize, parts: &Parts) -> bool {
+    let at_nodes: [f64; NODES] = std::array::from_fn(|a| {
+        let r = [(a % 3) as f64 - 1.0, (a / 3) as f64 - 1.0];
+        parts.distance(mesh.from_reference(cell, r))
+    });
+    let [hx, hy] = mesh.cell_size(cell);
+    let least = LOST * hx.min(hy);
+    let steps = 2 * SQUARES;
+    (0..=steps * (steps + 1)).any(|k| {
+        let [x, y] = [k % (steps + 1), k / (steps + 1)];
+        let r = [x, y].map(|k| 2.0 * k as f64 / steps as f64 - 1.0);
+        let seen: f64 = Shape::values(r).iter().zip(&at_nodes).map(|(n, d)| n * d).sum();
+        seen > least && parts.distance(mesh.from_reference(cell, r)) < -least
+    })
+}
+/// The free part of a cell; `sides`: rules for the free parts of its sides.
+fn part(
+    cell: CellMeasure,
+    (fraction, rule): (f64, Vec<Weighted>),
+    sides: &[Vec<Weighted>; 4],
+    unresolved: bool,
+) -> Part {
+    let mut points = [PartPoint { weight: 0.0, r: [0.0; 2], shape: Shape::at([0.0; 2]) }; 9];
+    for (point, (r, weight)) in points.iter_mut().zip(reduced(rule)) {
+        *point = PartPoint { weight: weight / fraction, r, shape: Shape::at(r) };
+    }
+    let mut divergence = [[[0.0; NODES]; 2]; 3];
+    for (side, rule) in sides.iter().enumerate() {
+        let c = side_normal(side);
+        let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
+        for (r, weight) in rule {
+            let (area, n) = (sign * weight * cell.of_side(c), Shape::values(*r));
+            for (row, q) in divergence.iter_mut().zip([1.0, r[0], r[1]]) {
+                row[c].iter_mut().zip(n).for_each(|(entry, n)| *entry += area * q * n);
+            }
+        }
+    }
+    for p in &points {
+        let volume = cell.of_point(p.weight * fraction);
+        for c in 0..2 {
+            let slope = 2.0 / cell.size[c];
+            let row = divergence[1 + c][c].iter_mut();
+            row.zip(p.shape.n).for_each(|(entry, n)| *entry -= volume * slope * n);
+        }
+    }
+    Part { fraction, points, divergence, beside: vec![], stream: None, unresolved }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::Axis;
+    use super::super::outline::Outline;
+    use super::*;
+
+    fn mesh(n: usize) -> Mesh {
+        let axis = || Axis::new((0..=n).map(|k| k as f64 / n as f64).collect(), false);
+        Mesh::new(axis(), axis())
+    }
+
+    fn volume(mesh: &Mesh) -> f64 {
+        (0..mesh.cells()).filter(|&c| !mesh.solid[c]).map(|c| mesh.cell_volume(c)).sum()
+    }
+
+    #[test]
+    fn free_volumes_are_exact_for_straight_walls_and_of_second_order_for_circles() {
+        let triangle = Outline::polygon(vec![[-1.0, -0.2], [2.0, 0.7], [2.0, -3.0], [-1.0, -3.0]]);
+        let solid = |outline: &Outline| Solid {
+            name: "solid".into(),
+            outline: outline.clone(),
+            no_slip: true,
+        };
+        let below = |x: f64| -0.2 + 0.3 * (x + 1.0);
+        for n in [1, 3, 7] {
+            let m = mesh(n).with_solids(vec![solid(&triangle)]);
+            let exact = 1.0 - 0.5 * (below(0.0) + below(1.0));
+            assert!((volume(&m) - exact).abs() < 1e-13, "{n}: {} {exact}", volume(&m));
+        }
+        let circle = Outline::Circle { centre: [0.52, 0.47], radius: 0.3 };
+        let error = |n: usize| {
+            (volume(&mesh(n).with_solids(vec![solid(&circle)])) - 1.0 + circle.area()).abs()
+        };
+        assert!(error(8) < 1e-4 && error(32) < 0.1 * error(8), "{} {}", error(8), error(32));
+    }
+
+    #[test]
+    fn nine_positive_weights_integrate_biquadratic_functions() {
+        let outline = Outline::Circle { centre: [0.4, 0.5], radius: 0.35 };
+        let m = mesh(5).with_solids(vec![Solid { name: "solid".into(), outline, no_slip: true }]);
+        let parts = m.parts().unwrap();
+        assert!(parts.all().count() > 8);
+        for (cell, part) in parts.all() {
+            let distance = |r: Point| parts.distance(m.from_reference(cell, r));
+            let fine = rule(m.cell_centre(cell).map(|c| c > 0.5), distance);
+            for k in 0..9 {
+                let f = |r: &Point| r[0].powi(k % 3) * r[1].powi(k / 3);
+                let exact: f64 = fine.iter().map(|(r, w)| w * f(r)).sum();
+                let found: f64 =
+                    part.points.iter().map(|p| part.fraction * p.weight * f(&p.r)).sum();
+                assert!((exact - found).abs() < 1e-10, "{cell} {k}: {exact} {found}");
+            }
+            assert!(part.points.iter().all(|p| p.weight >= 0.0));
+        }
+    }
+}
