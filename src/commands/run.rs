@@ -208,6 +208,12 @@ fn report(ended: &Ended, profile: bool) -> String {
         }
         out.push('\n');
     }
+    for (name, f) in &s.forces {
+        out += &format!(
+            "  gauge {name}: force ({:.4e}, {:.4e}) N/m, torque {:.4e} N\n",
+            f.x, f.y, f.torque
+        );
+    }
     if let Some(p) = &s.purchase {
         out += &chosen::receipt_text(p);
     }

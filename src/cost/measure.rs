@@ -32,7 +32,7 @@ impl Target {
     /// velocity field.
     pub fn of(scene: &Scene) -> Result<Target, SceneError> {
         let interest = scene.interest.clone().unwrap_or_else(|| Interest {
-            quantity: match scene.gauges.first() {
+            quantity: match scene.gauges.iter().find(|g| g.on.is_none()) {
                 Some(g) => Interesting::Gauge(g.name.clone()),
                 None => Interesting::Velocity,
             },

@@ -105,6 +105,8 @@ pub struct StartCell {
     stride: [usize; 2],
     /// See [`CellVelocities`].
     free: bool,
+    /// Whether a solid of any shape is in the cell.
+    cut: bool,
 }
 
 impl StartCell {
@@ -115,6 +117,9 @@ impl StartCell {
     /// The cell among this one and its neighbours that certainly contains a point, with the
     /// reference coordinates of the point; `None` if there is none.
     fn near(&self, p: [f64; 2]) -> Option<(usize, [f64; 2])> {
+        if self.cut {
+            return None;
+        }
         let (mut cell, mut r) = (self.cell, self.reference(p));
         for c in 0..2 {
             if r[c].abs() < INSIDE {
@@ -214,6 +219,7 @@ impl<'a> FrozenFlow<'a> {
             spans: [spans(&self.mesh.x, i), spans(&self.mesh.y, j)],
             stride: [1, self.mesh.x.cells()],
             free,
+            cut: self.mesh.part(cell).is_some(),
         }
     }
 

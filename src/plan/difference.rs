@@ -20,7 +20,7 @@ impl Plan {
                 "the boundaries' values or the loads",
             ),
             (self.regions != other.regions, "the initial regions"),
-            (lines(self) != lines(other), "the gauges or the dye"),
+            (lines(self) != lines(other) || self.forces != other.forces, "the gauges or the dye"),
             (self.method != other.method, "the accuracy"),
             (times(self) != times(other), "the times of the run"),
             (self.content != other.content, "the recording"),

@@ -9,6 +9,7 @@ pub mod boundary;
 mod change;
 mod difference;
 mod effects;
+mod forces;
 pub mod loads;
 pub mod material;
 pub mod memory;
@@ -21,6 +22,7 @@ mod warning;
 
 pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
 pub use effects::{Effect, EffectKind, EffectList, StepTime};
+pub use forces::ForceGauge;
 pub use resolve::resolve;
 pub use sources::{Entering, Source};
 pub use units::Units;
@@ -73,6 +75,8 @@ pub struct Plan {
     pub acceleration: Option<[FieldFn; 2]>,
     /// Gauges.
     pub gauges: Vec<Gauge>,
+    /// Gauges of forces.
+    pub forces: Vec<ForceGauge>,
     /// Dye lines.
     pub tracers: Option<Tracers>,
     /// Segments whose particles are marked at the start.

@@ -37,6 +37,29 @@ pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), Plot
             ],
         )?;
     }
+    if !plan.forces.is_empty() {
+        let of = |value: &dyn Fn(&Row, usize) -> f64| -> Vec<Curve> {
+            let names = plan.forces.iter().enumerate();
+            names.map(|(k, g)| curve(&g.name, &|r| value(r, k))).collect()
+        };
+        panels_plot(
+            &folder.join("forces"),
+            &[
+                PlotSpec {
+                    title: format!("{title}: force along x"),
+                    x: time(),
+                    y: Axis::new("force along x", "N/m"),
+                    curves: of(&|r, k| r.forces[k].x),
+                },
+                PlotSpec {
+                    title: "force along y".into(),
+                    x: time(),
+                    y: Axis::new("force along y", "N/m"),
+                    curves: of(&|r, k| r.forces[k].y),
+                },
+            ],
+        )?;
+    }
     if plan.effects.directors {
         line_plot(
             &folder.join("alignment"),

@@ -1,7 +1,7 @@
 //! This module writes and reads `series.csv`: one row per step, in SI units.
 
 use crate::plan::Plan;
-use crate::sim::row::{GaugeRow, Place, Row, places};
+use crate::sim::row::{ForceRow, GaugeRow, Place, Row, places};
 use crate::words::count;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
@@ -170,6 +170,7 @@ fn parse(line: &str, places: &[Place], plan: &Plan) -> Result<Row, String> {
     }
     let mut row = Row::empty(plan.state.materials.len());
     row.gauges = plan.gauges.iter().map(|_| GaugeRow::default()).collect();
+    row.forces = plan.forces.iter().map(|_| ForceRow::default()).collect();
     places.iter().zip(&values).try_for_each(|(place, text)| place.set(&mut row, text))?;
     Ok(row)
 }

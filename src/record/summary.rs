@@ -6,7 +6,7 @@ use crate::scene::{Quadrature, scene_hash};
 use crate::sim::Run;
 use crate::sim::criteria::{ACCURATE_ENERGY, ENERGY_STEPS};
 use crate::sim::phases::Phases;
-use crate::sim::row::{GaugeRow, Row};
+use crate::sim::row::{ForceRow, GaugeRow, Row};
 use indexmap::IndexMap;
 use serde::Serialize;
 use std::path::Path;
@@ -66,6 +66,9 @@ pub struct Summary {
     pub unknowns: Unknowns,
     /// Outflow volume and rate at the end, by gauge.
     pub gauges: IndexMap<String, GaugeRow>,
+    /// Forces on sides, walls and blocks at the end, by the names of their gauges.
+    #[serde(skip_serializing_if = "IndexMap::is_empty")]
+    pub forces: IndexMap<String, ForceRow>,
     /// Relative change of the projected area since the start, by material.
     pub volume_drift: IndexMap<String, f64>,
     /// Volume mean of |n_x| over particles with layers; absent without directors.
@@ -298,6 +301,12 @@ impl Summary {
                 .iter()
                 .map(|g| g.name.clone())
                 .zip(row.gauges.iter().cloned())
+                .collect(),
+            forces: plan
+                .forces
+                .iter()
+                .map(|g| g.name.clone())
+                .zip(row.forces.iter().copied())
                 .collect(),
             volume_drift: plan
                 .state

@@ -22,6 +22,8 @@ pub(super) struct Summary {
     pub(super) rms_speed: Option<f64>,
     pub(super) particles: u64,
     pub(super) gauges: IndexMap<String, Gauge>,
+    #[serde(default)]
+    pub(super) forces: IndexMap<String, Force>,
     pub(super) volume_drift: IndexMap<String, Option<f64>>,
     #[serde(default)]
     pub(super) mean_alignment: Option<f64>,
@@ -32,6 +34,13 @@ pub(super) struct Summary {
     /// The text of the file.
     #[serde(skip)]
     pub(super) text: String,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+pub(super) struct Force {
+    pub(super) x: Option<f64>,
+    pub(super) y: Option<f64>,
+    pub(super) torque: Option<f64>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -73,6 +82,11 @@ impl Summary {
             let prefix = if self.gauges.len() > 1 { format!("{name}.") } else { String::new() };
             put(&format!("{prefix}outflow_volume"), gauge.volume);
             put(&format!("{prefix}outflow_rate"), gauge.rate);
+        }
+        for (name, force) in &self.forces {
+            put(&format!("{name}.force_x"), force.x);
+            put(&format!("{name}.force_y"), force.y);
+            put(&format!("{name}.torque"), force.torque);
         }
         put("max_speed", self.max_speed);
         put("rms_speed", self.rms_speed);

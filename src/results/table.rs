@@ -1,7 +1,7 @@
 //! This module reads the series of a run: columns of values against time.
 
 use crate::record::rerun_log::Sample;
-use crate::sim::row::{COLUMNS, Column, PER_GAUGE, PER_MATERIAL, Rank, find};
+use crate::sim::row::{COLUMNS, Column, PER_FORCE, PER_GAUGE, PER_MATERIAL, Rank, find};
 use crate::words::count;
 use indexmap::IndexMap;
 use std::collections::BTreeMap;
@@ -123,6 +123,7 @@ fn column(path: &str, gauges: usize) -> Option<String> {
             let name = in_family(&PER_GAUGE, what)?.name;
             Some(if gauges > 1 { format!("{gauge}.{name}") } else { name.into() })
         }
+        ["forces", gauge, what] => Some(format!("{gauge}.{}", in_family(&PER_FORCE, what)?.name)),
         [family, material] if in_family(&PER_MATERIAL, family).is_some() => {
             Some(format!("{material}.{}", in_family(&PER_MATERIAL, family)?.name))
         }

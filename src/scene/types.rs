@@ -1059,21 +1059,48 @@ pub struct Gauge {
     #[schemars(extend("examples" = ["outlet"]))]
     pub name: String,
     /// Coordinates x and y of one end.
-    #[schemars(extend("x-unit" = "m", "x-range" = "in the domain", "examples" = [[0.9, 0.5]]))]
-    pub from: [Quantity; 2],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m",
+        "x-range" = "in the domain",
+        "x-default" = "none, with `on`",
+        "examples" = [[0.9, 0.5]]
+    ))]
+    pub from: Option<[Quantity; 2]>,
     /// Coordinates x and y of the other end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
         "x-unit" = "m",
         "x-range" = "in the domain; `x` or `y` as in `from`",
+        "x-default" = "none, with `on`",
         "examples" = [[1.1, 0.5]]
     ))]
-    pub to: [Quantity; 2],
+    pub to: Option<[Quantity; 2]>,
     /// Direction in which crossing counts as positive.
-    #[schemars(extend("x-range" = "across the segment", "examples" = ["down"]))]
-    pub direction: Direction,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "across the segment",
+        "x-default" = "none, with `on`",
+        "examples" = ["down"]
+    ))]
+    pub direction: Option<Direction>,
     /// Name of the material that is measured.
-    #[schemars(extend("x-range" = "a material", "examples" = ["sand"]))]
-    pub material: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "a material",
+        "x-default" = "none, with `on`",
+        "examples" = ["sand"]
+    ))]
+    pub material: Option<String>,
+    /// Side, wall or block whose force from all materials is measured, instead of a flow across a
+    /// segment: `left`, `right`, `bottom`, `top` or a name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-range" = "a side, a wall or a block",
+        "x-default" = "none: a flow is measured",
+        "examples" = ["step"]
+    ))]
+    pub on: Option<String>,
 }
 
 /// Quantity whose error is measured, and how the error is measured.

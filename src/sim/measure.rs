@@ -4,8 +4,9 @@ use super::clock::{Limiter, Speeds};
 use super::criteria::ACCURATE_ENERGY;
 use super::inertia::twice_kinetic;
 use super::phases::Phases;
-use super::row::{GaugeRow, Measured, Row};
+use super::row::{ForceRow, GaugeRow, Measured, Row};
 use super::simulation::Simulation;
+use crate::plan::ForceGauge;
 use crate::solve::element::{PointShape, rates};
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
@@ -140,6 +141,29 @@ impl<const D: usize> Simulation<D> {
         self.report.power_in - weight
     }
 
+    /// Forces of the materials on what the gauges of forces name, from the residual of the flow.
+    fn forces(&self) -> Vec<ForceRow> {
+        let (plan, mesh) = (&self.plan, &self.plan.mesh);
+        let force = plan.units.stress() * plan.units.length;
+        let of = |gauge: &ForceGauge| {
+            let mut sum = ForceRow::default();
+            for &(node, carries) in &gauge.nodes {
+                let r = self.reactions[node];
+                let f = [0, 1].map(|c| if carries[c] { r[c] } else { 0.0 });
+                let at = mesh.node_position(node);
+                let arm = [0, 1].map(|c| at[c] - gauge.about[c]);
+                sum.x += force * f[0];
+                sum.y += force * f[1];
+                sum.torque += force * plan.units.length * (arm[0] * f[1] - arm[1] * f[0]);
+                if D == 3 && carries[0] {
+                    sum.torque += force * plan.units.length * r[D - 1];
+                }
+            }
+            sum
+        };
+        plan.forces.iter().map(of).collect()
+    }
+
     /// See [`Row::volume_error`].
     fn volume_error(&self) -> f64 {
         let mesh = &self.plan.mesh;
@@ -248,7 +272,8 @@ impl<const D: usize> Simulation<D> {
             dissipated,
             energy_error,
         };
-        let row = Row::measured(&measured, gauges, drift, seconds);
+        let forces = self.forces();
+        let row = Row::measured(&measured, gauges, forces, drift, seconds);
         self.last_other_power = other;
         self.row = row;
         seconds.diagnostics += phase.elapsed().as_secs_f64();

@@ -62,6 +62,8 @@ pub enum Panel {
     OutflowVolume,
     /// Fluxes across the gauges.
     OutflowRate,
+    /// Forces on sides, walls and blocks.
+    Force,
     /// Mean alignment of directors.
     Alignment,
     /// Powers; only for scenes without gauges.
@@ -76,9 +78,10 @@ pub enum Panel {
 
 impl Panel {
     /// All panels in order.
-    pub const ALL: [Panel; 7] = [
+    pub const ALL: [Panel; 8] = [
         Panel::OutflowVolume,
         Panel::OutflowRate,
+        Panel::Force,
         Panel::Alignment,
         Panel::Power,
         Panel::Balances,
@@ -91,6 +94,7 @@ impl Panel {
         match self {
             Panel::OutflowVolume => ("Outflow volume (m²)", false),
             Panel::OutflowRate => ("Outflow rate (m²/s)", false),
+            Panel::Force => ("Force (N/m)", false),
             Panel::Alignment => ("Mean alignment |n_x|", false),
             Panel::Power => ("Power (W/m)", false),
             Panel::Balances => ("Balances (log10)", true),
@@ -255,6 +259,8 @@ macro_rules! columns {
             $( $(#[doc = $doc])+ pub $field: $type, )*
             /// Values of each gauge.
             pub gauges: Vec<GaugeRow>,
+            /// Values of each gauge of a force.
+            pub forces: Vec<ForceRow>,
             /// Relative change since the start of the projected area of each material over the
             /// volume of its particles, which is exact.
             pub drift: Vec<f64>,
@@ -268,6 +274,7 @@ macro_rules! columns {
                 Row {
                     $( $field: $empty, )*
                     gauges: vec![],
+                    forces: vec![],
                     drift: vec![0.0; materials],
                     seconds: Phases::default(),
                 }
@@ -277,10 +284,11 @@ macro_rules! columns {
             pub fn measured(
                 m: &Measured,
                 gauges: Vec<GaugeRow>,
+                forces: Vec<ForceRow>,
                 drift: Vec<f64>,
                 seconds: Phases,
             ) -> Row {
-                Row { $( $field: { let $m = m; $of }, )* gauges, drift, seconds }
+                Row { $( $field: { let $m = m; $of }, )* gauges, forces, drift, seconds }
             }
         }
 
@@ -492,6 +500,72 @@ pub static PER_GAUGE: [Column; 3] = [
     },
 ];
 
+/// Force of the materials on a side, a wall or a block.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct ForceRow {
+    /// Force along x per unit depth, N/m.
+    pub x: f64,
+    /// Force along y per unit depth, N/m.
+    pub y: f64,
+    /// Torque about the middle of what carries the force, counter-clockwise, per unit depth, N.
+    pub torque: f64,
+}
+
+/// Columns of each gauge of a force, with the name of the gauge as a prefix.
+pub static PER_FORCE: [Column; 3] = [
+    Column {
+        name: "force_x",
+        symbol: "F_x",
+        unit: "N/m",
+        label: "force along x",
+        meaning: "Force of all materials along x on a side, a wall or a block.",
+        path: "force_x",
+        rank: Rank::Compared(1),
+        panel: Some(Panel::Force),
+        live: true,
+        access: Access {
+            number: |r, k| r.forces[k].x,
+            text: |r, k, f| r.forces[k].x.text(f),
+            set: |r, k, t| put(&mut r.forces[k].x, t),
+        },
+        ..Column::PLAIN
+    },
+    Column {
+        name: "force_y",
+        symbol: "F_y",
+        unit: "N/m",
+        label: "force along y",
+        meaning: "Force of all materials along y on a side, a wall or a block.",
+        path: "force_y",
+        rank: Rank::Compared(1),
+        panel: Some(Panel::Force),
+        live: true,
+        access: Access {
+            number: |r, k| r.forces[k].y,
+            text: |r, k, f| r.forces[k].y.text(f),
+            set: |r, k, t| put(&mut r.forces[k].y, t),
+        },
+        ..Column::PLAIN
+    },
+    Column {
+        name: "torque",
+        symbol: "T",
+        unit: "N",
+        label: "torque",
+        meaning: "Torque of all materials about the middle of a side, a wall or a block, \
+                  counter-clockwise.",
+        path: "torque",
+        rank: Rank::Compared(1),
+        live: true,
+        access: Access {
+            number: |r, k| r.forces[k].torque,
+            text: |r, k, f| r.forces[k].torque.text(f),
+            set: |r, k, t| put(&mut r.forces[k].torque, t),
+        },
+        ..Column::PLAIN
+    },
+];
+
 /// Columns of each material.
 pub static PER_MATERIAL: [Column; 1] = [Column {
     name: "volume_drift",
@@ -618,6 +692,17 @@ pub fn places(plan: &Plan) -> Vec<Place> {
             }));
         }
     }
+    for (index, gauge) in plan.forces.iter().enumerate() {
+        let name = &gauge.name;
+        list.extend(PER_FORCE.iter().map(|column| Place {
+            name: format!("{name}.{}", column.name),
+            path: format!("forces/{name}/{}", column.path),
+            curve: format!("{name} {}", column.label),
+            live_name: format!("{name} {}", column.label),
+            column,
+            index,
+        }));
+    }
     for (index, material) in plan.state.materials.iter().enumerate() {
         list.extend(PER_MATERIAL.iter().map(|column| Place {
             name: format!("{}.{}", material.name, column.name),
@@ -635,7 +720,7 @@ pub fn places(plan: &Plan) -> Vec<Place> {
 /// material.
 pub fn find(name: &str) -> Option<&'static Column> {
     let last = name.rsplit('.').next().unwrap_or(name);
-    COLUMNS.iter().chain(&PER_GAUGE).chain(&PER_MATERIAL).find(|c| c.name == last)
+    COLUMNS.iter().chain(&PER_GAUGE).chain(&PER_FORCE).chain(&PER_MATERIAL).find(|c| c.name == last)
 }
 
 /// Volume mean of |n_x| over layered particles.

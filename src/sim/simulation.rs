@@ -99,6 +99,8 @@ pub struct Simulation<const D: usize> {
     pub(super) first_energy: f64,
     pub(super) row: Row,
     pub(super) report: Report,
+    /// Forces of the materials on the supports, by node; empty without gauges of forces.
+    pub(super) reactions: Vec<[f64; D]>,
     pub(super) events: Vec<String>,
     /// Warnings about the initial state.
     pub(super) notes: Vec<Warning>,
@@ -183,6 +185,7 @@ impl<const D: usize> Simulation<D> {
             recent_energy: [0.0; 2],
             row: Row::empty(plan.state.materials.len()),
             report: Report::default(),
+            reactions: vec![],
             events: vec![],
             notes: vec![],
             longest: None,

@@ -64,6 +64,9 @@ impl<const D: usize> Simulation<D> {
             stokes.solve(quadrature, loads, stopping, flow)
         };
         self.report = solved.map_err(failed)?;
+        if !plan.forces.is_empty() {
+            stokes.reactions(quadrature, loads, flow, &mut self.reactions);
+        }
         self.separate_inertia();
         seconds.assemble += self.report.seconds.assemble;
         seconds.factor += self.report.seconds.factor;

@@ -122,6 +122,25 @@ impl<const D: usize> Stokes<D> {
         Ok(report)
     }
 
+    /// Forces of the materials on the supports at all nodes, `f - K u + B' p`.
+    pub fn reactions(
+        &mut self,
+        quadrature: &Quadrature,
+        loads: Loads<D>,
+        flow: &Flow<D>,
+        out: &mut Vec<[f64; D]>,
+    ) {
+        let mut work = std::mem::take(&mut self.work);
+        self.residual(quadrature, loads, flow, &mut work);
+        out.clone_from(&work.residual.force);
+        if let Some(relations) = self.constraints.embedding() {
+            for (node, force) in relations.nodes().zip(&work.residual.on_solids) {
+                out[node][..2].copy_from_slice(&force[..2]);
+            }
+        }
+        self.work = work;
+    }
+
     /// Corrects `flow` until the residual, the divergence and the balance of powers are small.
     fn iterate(
         &mut self,

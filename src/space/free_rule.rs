@@ -11,6 +11,9 @@ use super::shape::{GAUSS_3, GAUSS_3_WEIGHTS, NODES};
 /// Number of squares along a cell that its outline is found with.
 pub const SQUARES: usize = 8;
 
+/// Distance, in the units of the mesh, up to which a corner of a square is on an outline.
+const ON_OUTLINE: f64 = 1e-14;
+
 /// A point of a rule with its weight.
 pub type Weighted = (Point, f64);
 
@@ -43,7 +46,7 @@ pub fn rule(flipped: [bool; 2], distance: impl Fn(Point) -> f64) -> Vec<Weighted
             let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
             // The diagonal from the outer to the inner corner.
             for triangle in [[a, b, c], [a, c, d]] {
-                add_triangle(&triangle, &mut out);
+                add_triangle(&triangle, &distance, &mut out);
             }
         }
     }
@@ -77,7 +80,18 @@ pub fn side_rule(side: usize, distance: impl Fn(Point) -> f64) -> Vec<Weighted> 
 }
 
 /// Adds a rule for the part of a triangle where a linear function is positive.
-fn add_triangle(corners: &[(Point, f64); 3], out: &mut Vec<Weighted>) {
+fn add_triangle(
+    corners: &[(Point, f64); 3],
+    distance: &impl Fn(Point) -> f64,
+    out: &mut Vec<Weighted>,
+) {
+    if corners.iter().all(|(_, d)| d.abs() <= ON_OUTLINE) {
+        // The triangle fills a corner of the outline, on one side or the other.
+        let middle = [0, 1].map(|c| corners.iter().map(|(p, _)| p[c] / 3.0).sum());
+        if distance(middle) < 0.0 {
+            return;
+        }
+    }
     let mut free: Vec<Point> = Vec::with_capacity(4);
     for k in 0..3 {
         let ((p, dp), (q, dq)) = (corners[k], corners[(k + 1) % 3]);

@@ -95,7 +95,8 @@ pub fn handles(scene: &Scene) -> Vec<Handle> {
     let walls = scene.walls.iter().enumerate();
     let walls = walls.filter_map(|(k, w)| segment(Key::Walls, k, &w.name, &w.from, &w.to));
     let gauges = scene.gauges.iter().enumerate();
-    let gauges = gauges.filter_map(|(k, g)| segment(Key::Gauges, k, &g.name, &g.from, &g.to));
+    let gauges = gauges
+        .filter_map(|(k, g)| segment(Key::Gauges, k, &g.name, g.from.as_ref()?, g.to.as_ref()?));
     domain.into_iter().chain(regions).chain(blocks).chain(walls).chain(gauges).collect()
 }
 

@@ -4,7 +4,7 @@ use super::materials::material_index;
 use super::values::Result;
 use super::walls::axis_segment;
 use crate::plan::{Gauge, Units};
-use crate::scene::{Direction, Interesting, Moment, Scene, SceneError, Scope, closest};
+use crate::scene::{self, Direction, Interesting, Moment, Scene, SceneError, Scope, closest};
 use crate::space::mesh::Mesh;
 use crate::space::segment::Segment;
 
@@ -31,31 +31,96 @@ impl SiGauge {
     }
 }
 
-pub(super) fn gauges(scene: &Scene, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Vec<SiGauge>> {
-    let mut list: Vec<SiGauge> = Vec::new();
+/// The gauges of a scene: those of flows, and those of forces with what carries them; `supports` are the
+/// names of all that may.
+pub(super) fn gauges(
+    scene: &Scene,
+    scope: &Scope,
+    domain: [[f64; 2]; 2],
+    supports: &[String],
+) -> Result<(Vec<SiGauge>, Vec<(String, String)>)> {
+    let (mut flows, mut forces) = (Vec::new(), Vec::new());
     for (k, g) in scene.gauges.iter().enumerate() {
         let what = format!("gauge `{}`", g.name);
-        let segment = axis_segment(&what, &g.from, &g.to, scope, domain)?;
-        let wanted = usize::from(matches!(g.direction, Direction::Up | Direction::Down));
-        if segment.normal != wanted {
-            return Err(SceneError::at(
-                &g.from[0],
-                format!("{what}: its direction runs along the segment"),
-                "a horizontal gauge counts `up` or `down`, a vertical one `left` or `right`",
-            ));
-        }
-        if list.iter().any(|o| o.name == g.name) {
+        if scene.gauges[..k].iter().any(|o| o.name == g.name) {
             return Err(SceneError::of_key(
                 format!("gauges[{k}].name"),
                 format!("two gauges are named `{}`", g.name),
                 "rename one",
             ));
         }
-        let material =
-            material_index(&scene.materials, &g.material, &what, &format!("gauges[{k}].material"))?;
-        list.push(SiGauge { name: g.name.clone(), segment, direction: g.direction, material });
+        match &g.on {
+            Some(on) => forces.push((g.name.clone(), force(g, k, on, supports)?)),
+            None => flows.push(flow(scene, scope, domain, (g, k), &what)?),
+        }
     }
-    Ok(list)
+    Ok((flows, forces))
+}
+
+/// A gauge of the flow across a segment.
+fn flow(
+    scene: &Scene,
+    scope: &Scope,
+    domain: [[f64; 2]; 2],
+    (g, k): (&scene::Gauge, usize),
+    what: &str,
+) -> Result<SiGauge> {
+    let missing = |key: &str| {
+        SceneError::of_key(
+            format!("gauges[{k}]"),
+            format!("key `{key}` is missing in {what}"),
+            format!("add `{key} = ...`, or measure the force on a wall with `on = ...`"),
+        )
+    };
+    let from = g.from.as_ref().ok_or_else(|| missing("from"))?;
+    let to = g.to.as_ref().ok_or_else(|| missing("to"))?;
+    let direction = g.direction.ok_or_else(|| missing("direction"))?;
+    let name = g.material.as_ref().ok_or_else(|| missing("material"))?;
+    let segment = axis_segment(what, from, to, scope, domain)?;
+    let wanted = usize::from(matches!(direction, Direction::Up | Direction::Down));
+    if segment.normal != wanted {
+        return Err(SceneError::at(
+            &from[0],
+            format!("{what}: its direction runs along the segment"),
+            "a horizontal gauge counts `up` or `down`, a vertical one `left` or `right`",
+        ));
+    }
+    let material = material_index(&scene.materials, name, what, &format!("gauges[{k}].material"))?;
+    Ok(SiGauge { name: g.name.clone(), segment, direction, material })
+}
+
+/// What carries the force of a gauge.
+fn force(g: &scene::Gauge, k: usize, on: &str, supports: &[String]) -> Result<String> {
+    let excluded = [
+        ("from", g.from.is_some()),
+        ("to", g.to.is_some()),
+        ("direction", g.direction.is_some()),
+        ("material", g.material.is_some()),
+    ];
+    if let Some((key, _)) = excluded.into_iter().find(|(_, given)| *given) {
+        return Err(SceneError::of_key(
+            format!("gauges[{k}].{key}"),
+            format!("gauge `{}` has both `on` and `{key}`", g.name),
+            "`on` measures the force of all materials: remove one of the two",
+        ));
+    }
+    match supports.iter().filter(|name| *name == on).count() {
+        0 => {
+            let help = closest(on, supports.iter().map(String::as_str))
+                .map_or(String::new(), |name| format!("did you mean `{name}`? "));
+            Err(SceneError::of_key(
+                format!("gauges[{k}].on"),
+                format!("gauge `{}`: there is no side, wall or block `{on}`", g.name),
+                format!("{help}choices: {}", supports.join(", ")),
+            ))
+        }
+        1 => Ok(on.to_string()),
+        _ => Err(SceneError::of_key(
+            format!("gauges[{k}].on"),
+            format!("gauge `{}`: several sides, walls or blocks are named `{on}`", g.name),
+            "rename walls and blocks: left, right, bottom and top are the sides",
+        )),
+    }
 }
 
 /// Checks that the scene has the quantity named in `[interest]`.
@@ -65,9 +130,10 @@ pub(super) fn interest(scene: &Scene) -> Result<()> {
         Err(SceneError::of_key("interest", format!("interest: {what}"), help))
     };
     if let Interesting::Gauge(name) | Interesting::Rate(name) = &i.quantity
-        && !scene.gauges.iter().any(|g| g.name == *name)
+        && !scene.gauges.iter().any(|g| g.name == *name && g.on.is_none())
     {
-        let names: Vec<&str> = scene.gauges.iter().map(|g| g.name.as_str()).collect();
+        let flows = scene.gauges.iter().filter(|g| g.on.is_none());
+        let names: Vec<&str> = flows.map(|g| g.name.as_str()).collect();
         let meant = closest(name, names.iter().copied());
         let help = match meant {
             Some(meant) => format!("did you mean `{meant}`?"),

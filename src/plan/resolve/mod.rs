@@ -24,8 +24,8 @@ pub(super) mod walls;
 
 pub use schedule::resolve;
 
-use super::boundary;
 use super::{EffectSet, InitialFields, Method, Plan, Warning};
+use super::{boundary, forces};
 use crate::scene::{Field, FieldFn, Scene, SceneError, Scope, WallKind, is_folder_name};
 use materials::{SiMatter, thin_fluid};
 use regions::{placed, regions};
@@ -77,7 +77,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     warnings.extend(si.warnings.iter().cloned());
 
     let mut walls = Walls::new(scene, scope, domain)?;
-    let gauges = gauges::gauges(scene, scope, domain)?;
+    let supports = forces::names(&walls);
+    let (gauges, wanted) = gauges::gauges(scene, scope, domain, &supports)?;
     gauges::interest(scene)?;
     let candidates = inflow::Candidates { scene, scope, materials: &si.materials };
     let sides = sides::sides(scene, scope, domain, candidates)?;
@@ -97,6 +98,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let held = (&state, scene.inertia);
     let boundary = boundary::boundary(sides, &walls, &mesh, &units, held, sources)?;
     let enclosure = walls.enclosure(&boundary, &mesh, &units);
+    let forces = forces::force_gauges(&wanted, (&walls, &boundary), &mesh, &units);
 
     let regions = regions(scene, scope, domain, &si, &mut Vec::new())?;
     let has_density = si.materials.iter().any(|m| m.density > 0.0 || m.density_field.is_some());
@@ -180,6 +182,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         body_force,
         acceleration,
         gauges,
+        forces,
         tracers,
         marks,
         method: Method {

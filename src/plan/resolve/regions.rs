@@ -116,7 +116,7 @@ pub(super) fn placed(scene: &Scene) -> Scene {
         m.background && everywhere.is_none()
             || enters(name)
             || regions.iter().any(|r| r.material == *name)
-            || gauges.iter().any(|g| g.material == *name)
+            || gauges.iter().any(|g| g.material.as_ref() == Some(name))
     });
     s
 }
