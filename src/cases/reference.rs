@@ -51,7 +51,7 @@ fn values(plan: &Plan, index: usize, material: &Material, [x, y]: [f64; 2]) -> (
 fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
     let mesh = &plan.mesh;
     let materials = &plan.state.materials;
-    let quadrature = Quadrature::from_fields(mesh, materials.len(), |_, p| {
+    let mut quadrature = Quadrature::from_fields(mesh, materials.len(), |_, p| {
         let si = plan.si(p);
         let Some((index, director)) = material_at(plan, si) else { return Default::default() };
         let material = &materials[index];
@@ -63,6 +63,7 @@ fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
         }
         (material.law.at(&Here::without_flow(eta, &orientation)), density, eta)
     });
+    quadrature.bind_slip(mesh, plan.boundary.slip_faces(mesh, &plan.units));
     let mut load = plan.fixed_loads::<D>();
     let masses = Masses::Points(&quadrature);
     add_acceleration(plan, masses, &mut load);

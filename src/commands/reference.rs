@@ -384,6 +384,22 @@ material = "sand"
         ("right.parts[0].inflow_director", "boundaries.right.parts[0].inflow=sand"),
         ("bottom.parts[0].inflow_director", "boundaries.bottom.parts[0].inflow=sand"),
         ("top.parts[0].inflow_director", "boundaries.top.parts[0].inflow=sand"),
+        (
+            "left.parts[0].slip_length",
+            "boundaries.left.parts=[{ from = 0.1, to = 0.5, slip_length = 1 }]",
+        ),
+        (
+            "right.parts[0].slip_length",
+            "boundaries.right.parts=[{ from = 0.1, to = 0.5, slip_length = 1 }]",
+        ),
+        (
+            "bottom.parts[0].slip_length",
+            "boundaries.bottom.parts=[{ from = 0.1, to = 0.5, slip_length = 1 }]",
+        ),
+        (
+            "top.parts[0].slip_length",
+            "boundaries.top.parts=[{ from = 0.1, to = 0.5, slip_length = 1 }]",
+        ),
         ("sources[0]", "boundaries.top.kind=open"),
         (
             "sources[0]",

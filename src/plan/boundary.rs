@@ -1,7 +1,9 @@
 //! This module turns the boundary conditions of a scene into constraints.
 
+use super::resolve::slip::Slips;
 use super::resolve::values::Result;
 use super::resolve::walls::{SiBlock, Walls};
+use super::slip::{Slip, WallLaw};
 use super::sources::{Entering, Source};
 use super::{Matter, Units};
 use crate::scene::{FieldFn, SceneError, WallKind};
@@ -19,6 +21,8 @@ pub struct Conditions {
     pub traction: [Option<FieldFn>; 2],
     /// Prescribed Cosserat rotation rate, 1/s.
     pub rotation: Option<FieldFn>,
+    /// How the side resists material that slides along it, if it does.
+    pub slip: Option<Slip>,
 }
 
 impl Conditions {
@@ -85,6 +89,8 @@ pub struct WallLine {
     pub no_slip: bool,
     /// Prescribed Cosserat rotation rate, 1/s (SI).
     pub rotation: Option<f64>,
+    /// How it resists material that slides along it, if it does.
+    pub slip: Option<WallLaw>,
 }
 
 /// All boundary conditions.
@@ -256,7 +262,7 @@ impl BoundaryPlan {
 /// Boundary conditions of sides, walls and blocks on the mesh. The segments of `sides` are in m.
 pub(super) fn boundary(
     mut sides: [Side; 4],
-    walls: &Walls,
+    (walls, slips): (&Walls, &Slips),
     mesh: &Mesh,
     units: &Units,
     (state, inertia): (&Matter, bool),
@@ -266,24 +272,30 @@ pub(super) fn boundary(
         piece.segment = piece.segment.on_mesh(mesh, units.length);
     }
     let mut lines = Vec::new();
-    let mut add = |segment: Segment, kind: WallKind, rotation| {
+    let mut add = |segment: Segment, kind: WallKind, rotation, slip| {
         let segment = segment.on_mesh(mesh, units.length);
-        lines.push(WallLine { segment, no_slip: kind == WallKind::NoSlip, rotation });
+        lines.push(WallLine { segment, no_slip: kind == WallKind::NoSlip, rotation, slip });
     };
     for w in &walls.walls {
-        add(w.segment, w.kind, w.rotation);
+        add(w.segment, w.kind, w.rotation, slips.walls[w.index]);
     }
-    for SiBlock { range, kind, .. } in &walls.blocks {
+    for SiBlock { range, kind, index, .. } in &walls.blocks {
+        // Nozzles are blocks without slip.
+        let slip = slips.blocks.get(*index).copied().flatten();
         for normal in 0..2 {
             let [from, to] = range[1 - normal];
             for at in range[normal] {
-                add(Segment { normal, at, from, to }, *kind, None);
+                add(Segment { normal, at, from, to }, *kind, None, slip);
             }
         }
     }
     let held = |c: usize| {
-        pieces(&sides).any(|(_, p)| p.conditions.velocity[c].is_some())
-            || lines.iter().any(|w| w.segment.normal == c || w.no_slip)
+        let holds = |p: &Piece| {
+            let slips = p.conditions.slip.is_some() && p.segment.normal != c;
+            slips || p.conditions.velocity[c].is_some()
+        };
+        pieces(&sides).any(|(_, p)| holds(p))
+            || lines.iter().any(|w| w.segment.normal == c || w.no_slip || w.slip.is_some())
             || mesh
                 .parts()
                 .is_some_and(|parts| parts.solids.iter().any(|s| s.no_slip || s.outline.holds(c)))

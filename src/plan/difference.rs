@@ -1,20 +1,21 @@
 //! This module finds differences between two plans other than values that may change during a run.
 
 use super::material::Material;
-use super::{Entering, Gauge, Matter, Plan, Source, Tracers};
+use super::{Entering, Gauge, Matter, Plan, SlipFace, Source, Tracers};
 use crate::space::parts::Parts;
 
 impl Plan {
     /// Short description of a difference other than the values of materials and gravity, which
     /// alone may change during a run; `None` if there is no such difference.
     pub fn beyond_matter(&self, other: &Plan) -> Option<&'static str> {
-        let checks: [(bool, &str); 12] = [
+        let checks: [(bool, &str); 13] = [
             (geometry(self) != geometry(other), "the mesh"),
             (self.effects != other.effects, "the set of solved effects"),
             (!same_history(&self.state, &other.state), "the kind of a material"),
             (self.initial != other.initial, "the values that particles carry"),
             (supports(self) != supports(other), "the boundaries"),
             (enters(self) != enters(other), "what enters"),
+            (slips(self) != slips(other), "the slip at walls"),
             (
                 loads(self) != loads(other) || self.acceleration != other.acceleration,
                 "the boundaries' values or the loads",
@@ -55,6 +56,13 @@ fn enters(p: &Plan) -> (Vec<Option<&Entering>>, Vec<Source>) {
         ..s
     });
     (p.boundary.pieces().map(|(_, piece)| piece.enters.as_ref()).collect(), sources.collect())
+}
+
+/// Faces along which material slips, with SI velocities of the walls.
+fn slips(p: &Plan) -> Vec<SlipFace> {
+    let speed = p.units.velocity();
+    let list = p.boundary.slip_faces(&p.mesh, &p.units).into_iter();
+    list.map(|f| SlipFace { wall: f.wall.map(|v| v * speed), ..f }).collect()
 }
 
 /// Gauges, dye lines and marks in SI units.

@@ -323,8 +323,8 @@ mod tests {
         let scope = Scope::new(&scene).expect("valid");
         assert_eq!(scene.gravity[1].eval(&scope).ok(), Some(-5.0));
         assert_eq!(scene.regions[0].material, "background");
-        assert_eq!(scene.walls[1].kind, crate::scene::WallKind::NoSlip);
-        assert_eq!(scene.boundaries.left.kind, crate::scene::BoundaryKind::NoSlip);
+        assert_eq!(scene.walls[1].kind, Some(crate::scene::WallKind::NoSlip));
+        assert_eq!(scene.boundaries.left.kind, Some(crate::scene::BoundaryKind::NoSlip));
         assert_eq!(scene.accuracy.cells, 16);
         assert_eq!(scene.recording.times.len(), 2);
         assert_eq!(scene.description, "another one");

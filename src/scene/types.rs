@@ -555,19 +555,31 @@ pub struct InflowDirector {
 pub struct Boundaries {
     /// Left side.
     #[serde(default)]
-    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
+    #[schemars(extend(
+        "x-default" = "`{ kind = \"free_slip\" }`",
+        "examples" = [{ "kind": "no_slip" }]
+    ))]
     pub left: Boundary,
     /// Right side.
     #[serde(default)]
-    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
+    #[schemars(extend(
+        "x-default" = "`{ kind = \"free_slip\" }`",
+        "examples" = [{ "kind": "no_slip" }]
+    ))]
     pub right: Boundary,
     /// Lower side.
     #[serde(default)]
-    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
+    #[schemars(extend(
+        "x-default" = "`{ kind = \"free_slip\" }`",
+        "examples" = [{ "kind": "no_slip" }]
+    ))]
     pub bottom: Boundary,
     /// Upper side.
     #[serde(default)]
-    #[schemars(extend("examples" = [{ "kind": "no_slip" }]))]
+    #[schemars(extend(
+        "x-default" = "`{ kind = \"free_slip\" }`",
+        "examples" = [{ "kind": "no_slip" }]
+    ))]
     pub top: Boundary,
 }
 
@@ -583,9 +595,14 @@ impl Boundaries {
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
     /// Kind of boundary condition.
-    #[serde(default)]
-    #[schemars(extend("examples" = ["no_slip"]))]
-    pub kind: BoundaryKind,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "`\"free_slip\"`", "examples" = ["no_slip"]))]
+    pub kind: Option<BoundaryKind>,
+    /// Slip length b of Navier's law, instead of `kind`: zero normal velocity, and the velocity along
+    /// the wall, relative to it, is b times its derivative across; the traction is (eta/b) u.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
+    pub slip_length: Option<Quantity>,
     /// Prescribed velocity along x; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
@@ -668,8 +685,14 @@ pub struct BoundaryPart {
     #[schemars(extend("x-unit" = "m", "x-range" = "on the side; > `from`", "examples" = [0.4]))]
     pub to: Quantity,
     /// Kind of boundary condition; not `periodic`.
-    #[schemars(extend("examples" = ["outflow"]))]
-    pub kind: BoundaryKind,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "required, or `slip_length`", "examples" = ["outflow"]))]
+    pub kind: Option<BoundaryKind>,
+    /// Slip length b of Navier's law, instead of `kind`: zero normal velocity, and the velocity along
+    /// the wall, relative to it, is b times its derivative across; the traction is (eta/b) u.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
+    pub slip_length: Option<Quantity>,
     /// Prescribed velocity along x; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
@@ -730,11 +753,20 @@ pub struct BoundaryPart {
     pub inflow_director: Option<InflowDirector>,
 }
 
+/// The law of a wall that is written instead of its kind.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GivenWall<'a> {
+    /// Slip length.
+    pub slip_length: Option<&'a Quantity>,
+}
+
 /// Conditions that are written for a side or for a part of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Given<'a> {
     /// Kind of boundary condition.
-    pub kind: BoundaryKind,
+    pub kind: Option<BoundaryKind>,
+    /// Law of the wall, instead of a kind.
+    pub wall: GivenWall<'a>,
     /// Prescribed velocity along x and y.
     pub velocity: [Option<&'a Field>; 2],
     /// Prescribed traction along x and y.
@@ -755,6 +787,7 @@ macro_rules! given {
             pub fn given(&self) -> Given<'_> {
                 Given {
                     kind: self.kind,
+                    wall: GivenWall { slip_length: self.slip_length.as_ref() },
                     velocity: [self.velocity_x.as_ref(), self.velocity_y.as_ref()],
                     traction: [self.traction_x.as_ref(), self.traction_y.as_ref()],
                     rotation: self.rotation.as_ref(),
@@ -766,6 +799,13 @@ macro_rules! given {
     )*};
 }
 given!(Boundary, BoundaryPart);
+
+impl Given<'_> {
+    /// The kind, or its default.
+    pub fn kind(&self) -> BoundaryKind {
+        self.kind.unwrap_or_default()
+    }
+}
 
 impl Boundary {
     /// The conditions of the side, followed by those of its parts.
@@ -820,9 +860,14 @@ pub struct Wall {
     ))]
     pub thickness: Option<Quantity>,
     /// Kind of boundary condition on both faces.
-    #[serde(default)]
-    #[schemars(extend("examples" = ["no_slip"]))]
-    pub kind: WallKind,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "`\"free_slip\"`", "examples" = ["no_slip"]))]
+    pub kind: Option<WallKind>,
+    /// Slip length b of Navier's law, instead of `kind`: zero normal velocity, and the velocity along
+    /// the wall, relative to it, is b times its derivative across; the traction is (eta/b) u.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
+    pub slip_length: Option<Quantity>,
     /// Prescribed Cosserat rotation rate on the wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
@@ -928,9 +973,14 @@ pub struct Block {
     ))]
     pub shape: Option<SolidShape>,
     /// Kind of boundary condition on its faces.
-    #[serde(default)]
-    #[schemars(extend("examples" = ["no_slip"]))]
-    pub kind: WallKind,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-default" = "`\"free_slip\"`", "examples" = ["no_slip"]))]
+    pub kind: Option<WallKind>,
+    /// Slip length b of Navier's law, instead of `kind`: zero normal velocity, and the velocity along
+    /// the wall, relative to it, is b times its derivative across; the traction is (eta/b) u.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
+    pub slip_length: Option<Quantity>,
 }
 
 /// A nozzle: a solid block, one cell thick, that pushes material in through one of its faces. An

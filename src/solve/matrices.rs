@@ -116,7 +116,8 @@ impl<const D: usize> Matrices<D> {
             self.built_from.fill(Content::Unknown);
         }
         // Terms on faces are not part of the content: cells with such a term are always computed.
-        let faces = || from.terms.on_faces().flat_map(|t| t.faces());
+        let terms = || from.terms.on_faces().chain([from.quadrature.slip() as &dyn FaceTerm]);
+        let faces = || terms().flat_map(|t| t.faces());
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
@@ -131,7 +132,7 @@ impl<const D: usize> Matrices<D> {
         }
         threads::for_each(&mut self.fresh, GRAIN, |_, fresh| fresh.build(from));
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
-        for term in from.terms.on_faces() {
+        for term in terms() {
             for (index, face) in term.faces().iter().enumerate() {
                 if let Ok(k) = self.fresh.binary_search_by_key(&face.cell, |f| f.cell) {
                     self.fresh[k].add_face(from, term, index);

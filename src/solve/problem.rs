@@ -113,6 +113,11 @@ pub(super) struct Residual<const D: usize> {
     pub(super) dissipation: f64,
     /// Power of the terms that only some scenes have.
     pub(super) restoring: f64,
+    /// Power of the motion of walls along which material slips.
+    pub(super) supplied: f64,
+    /// Square of the forces of moving walls along which material slips, in the norm of the residual,
+    /// summed face by face.
+    pub(super) drive: f64,
     /// `integral D:D`.
     pub(super) strain: f64,
     /// Square of the L2 norm of the projected divergence.

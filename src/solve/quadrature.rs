@@ -27,10 +27,12 @@ use super::local_laws::Evaluation;
 use super::points::{CutStiffness, IntegrationPoint};
 use super::sides::Kinked;
 use super::softening::{self, Directions, SofteningPoint};
+use super::terms::slip::SlipFaces;
 use crate::composition::{Composition, Content, EmptyCell, Kind, SCRATCH};
 use crate::laws::point::PointLaw;
 use crate::laws::rates::Rates;
 use crate::plan::material::Material;
+use crate::plan::slip::SlipFace;
 use crate::scene::Quadrature as Rule;
 use crate::space::constraints::FixedSides;
 use crate::space::kink::Kink;
@@ -76,6 +78,8 @@ pub struct Quadrature {
     directions: Vec<Directions>,
     /// Whether the element matrices have these derivatives.
     pub(super) softened: bool,
+    /// Walls along which material slips.
+    slip: SlipFaces,
     /// Volume factors of the materials in the last update.
     factors: Vec<f64>,
     /// Whether each cell is evaluated.
@@ -117,6 +121,7 @@ impl Quadrature {
             softening_before: vec![],
             directions: vec![],
             softened: true,
+            slip: SlipFaces::default(),
             factors: vec![],
             chosen: vec![],
         }
@@ -143,6 +148,17 @@ impl Quadrature {
             }
         }
         out
+    }
+
+    /// Declares the faces along which material slips.
+    pub fn bind_slip(&mut self, mesh: &Mesh, faces: Vec<SlipFace>) {
+        self.slip = SlipFaces::new(mesh, faces);
+        self.slip.evaluate(&self.mean_viscosity);
+    }
+
+    /// Walls along which material slips.
+    pub fn slip(&self) -> &SlipFaces {
+        &self.slip
     }
 
     /// Declares the sides of each cell on which the velocity is prescribed.
@@ -282,6 +298,19 @@ impl Quadrature {
         version: u32,
         flow: &dyn LastFlow,
     ) -> Result<(), EmptyCell> {
+        self.update_cells(mesh, particles, materials, version, flow)?;
+        self.slip.evaluate(&self.mean_viscosity);
+        Ok(())
+    }
+
+    fn update_cells(
+        &mut self,
+        mesh: &Mesh,
+        particles: &Particles,
+        materials: &[Material],
+        version: u32,
+        flow: &dyn LastFlow,
+    ) -> Result<(), EmptyCell> {
         let background = materials.iter().position(|m| m.background);
         self.kinds.clear();
         self.kinds.extend(materials.iter().map(|m| Kind {
@@ -315,6 +344,17 @@ impl Quadrature {
     /// Evaluates the cells with laws that depend on the flow again, with another iterate and
     /// otherwise the arguments of the last [`Quadrature::update`].
     pub fn reevaluate(
+        &mut self,
+        mesh: &Mesh,
+        particles: &Particles,
+        materials: &[Material],
+        flow: &dyn LastFlow,
+    ) {
+        self.reevaluate_cells(mesh, particles, materials, flow);
+        self.slip.evaluate(&self.mean_viscosity);
+    }
+
+    fn reevaluate_cells(
         &mut self,
         mesh: &Mesh,
         particles: &Particles,

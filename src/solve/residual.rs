@@ -3,9 +3,9 @@
 
 use super::problem::{CELL_GRAIN, Loads, Residual, Share, Stokes, Work};
 use super::quadrature::Quadrature;
-use super::terms::Terms;
 use super::terms::pressure::Divergence;
 use super::terms::viscous::{Internal, TOGETHER};
+use super::terms::{FaceTerm, Terms};
 use crate::space::flow::Flow;
 use crate::space::shape::{NODES, SIDE_NODES};
 use crate::threads;
@@ -53,15 +53,23 @@ impl<const D: usize> Stokes<D> {
         out.force.clear();
         out.force.extend_from_slice(nodal);
         self.incidence.add_up(&mut out.force, |cell, a| shares[cell].force[a]);
-        for term in terms.on_faces() {
+        (out.supplied, out.drive) = (0.0, 0.0);
+        for term in terms.on_faces().chain([quadrature.slip() as &dyn FaceTerm]) {
             for (index, face) in term.faces().iter().enumerate() {
                 let nodes = SIDE_NODES[face.side].map(|a| self.incidence.nodes[face.cell][a]);
                 let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
-                let (force, power) = term.force(index, nodes, u);
-                out.restoring += power;
-                for (node, f) in nodes.into_iter().zip(force) {
-                    out.force[node][0] += f[0];
-                    out.force[node][1] += f[1];
+                let (force, powers) = term.force(index, nodes, u);
+                out.restoring += powers.numerical;
+                out.dissipation += powers.dissipated;
+                out.supplied += powers.supplied;
+                let drive = term.drive(index);
+                for ((node, f), drive) in nodes.into_iter().zip(force).zip(drive) {
+                    for c in 0..2 {
+                        out.force[node][c] += f[c];
+                        if !self.constraints.is_fixed(node, c) {
+                            out.drive += drive[c] * drive[c] * self.inverse_diagonal[node][c];
+                        }
+                    }
                 }
             }
         }
@@ -199,6 +207,7 @@ impl<const D: usize> Stokes<D> {
             }
             sums
         });
+        let ff = ff + r.drive;
         // The last terms keep the ratios meaningful at rest and in a rigid rotation, where
         // divergence and strain are both rounding errors.
         let scale = ff.sqrt() + uu.sqrt() + PRESSURE_SHARE * r.pressure_norm.sqrt();
@@ -213,7 +222,7 @@ impl<const D: usize> Stokes<D> {
         )
     }
 
-    /// Power of the loads and of the reactions on moving boundaries.
+    /// Power of the loads, of the reactions on moving boundaries and of the friction at moving walls.
     pub(super) fn power_in(&self, r: &Residual<D>, load: &[[f64; D]], flow: &Flow<D>) -> f64 {
         let relations = self.constraints.embedding();
         let [power] = threads::sum(0..self.mesh.nodes(), |node| {
@@ -227,11 +236,11 @@ impl<const D: usize> Stokes<D> {
             }
             [power]
         });
-        let Some(relations) = relations else { return power };
+        let Some(relations) = relations else { return power + r.supplied };
         let on_solids = relations.nodes().zip(&r.on_solids).map(|(node, force)| {
             let u = flow.velocity[node];
             force[0] * u[0] + force[1] * u[1]
         });
-        power + r.continued - on_solids.sum::<f64>()
+        power + r.supplied + r.continued - on_solids.sum::<f64>()
     }
 }

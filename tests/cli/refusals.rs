@@ -275,6 +275,30 @@ const FAULTS: &[Fault] = &[
         &["source `spout` ends at 2.5 s, before it begins at 3 s"],
     ),
     (
+        "left.kind = \"free_slip\"",
+        "left = { kind = \"no_slip\", slip_length = 0.015 }",
+        "0.015",
+        &["boundaries.left gives both kind and slip_length", "give one of them"],
+    ),
+    (
+        "name = \"left_wall\"",
+        "name = \"left_wall\"\nkind = \"free_slip\"\nslip_length = 0.015",
+        "0.015",
+        &["wall `left_wall` gives both kind and slip_length", "give one of them"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left.slip_length = -0.5",
+        "-0.5",
+        &["boundaries.left: slip_length is -0.5", "above zero"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
+        "left = { slip_length = 0.5, traction_y = 3.5 }",
+        "3.5",
+        &["boundaries.left gives both slip_length and traction_y", "the wall determines"],
+    ),
+    (
         "bottom.kind = \"free_slip\"",
         "bottom.parts = [{ from = 0.5, to = 1 }]",
         "",

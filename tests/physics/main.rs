@@ -13,6 +13,7 @@ mod openings;
 mod order;
 mod patch;
 mod rest;
+mod slip;
 mod solids;
 mod sources;
 mod steps;

@@ -233,7 +233,7 @@ fn refinements(
             GradingTarget::Walls => {
                 for (s, side) in scene.boundaries.sides().into_iter().enumerate() {
                     if side.all_given().any(|given| {
-                        given.kind == BoundaryKind::NoSlip
+                        given.kind() == BoundaryKind::NoSlip
                             || given.velocity[1 - side_normal(s)].is_some()
                             || given.rotation.is_some()
                     }) {
@@ -261,7 +261,7 @@ fn periodic(scene: &Scene) -> Result<[bool; 2]> {
     let b = &scene.boundaries;
     let mut out = [false; 2];
     for (c, (low, high)) in [(&b.left, &b.right), (&b.bottom, &b.top)].into_iter().enumerate() {
-        let kinds = [low.kind, high.kind].map(|k| k == BoundaryKind::Periodic);
+        let kinds = [low.kind, high.kind].map(|k| k == Some(BoundaryKind::Periodic));
         if kinds[0] != kinds[1] {
             return Err(SceneError::of_key(
                 format!("boundaries.{}.kind", SIDES[2 * c + usize::from(kinds[1])]),

@@ -17,6 +17,7 @@ mod rotation;
 mod scales;
 mod schedule;
 mod sides;
+pub(super) mod slip;
 mod sources;
 mod time;
 pub(super) mod values;
@@ -77,6 +78,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     warnings.extend(si.warnings.iter().cloned());
 
     let mut walls = Walls::new(scene, scope, domain)?;
+    let slips = slip::Slips::new(scene, scope)?;
+    slips.refuse_on(&walls.solids)?;
     let supports = forces::names(&walls);
     let (gauges, wanted) = gauges::gauges(scene, scope, domain, &supports)?;
     gauges::interest(scene)?;
@@ -85,6 +88,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let size = length / f64::from(scene.accuracy.cells.max(1));
     let sources = sources::sources(candidates, domain, size)?;
     walls.blocks.extend(sources.iter().map(|s| SiBlock {
+        index: usize::MAX,
         name: s.name.clone(),
         range: s.block,
         kind: WallKind::NoSlip,
@@ -96,7 +100,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let mut clock = time::clock(scene, scope, &units)?;
     sources::add_stops(&sources, &mut clock);
     let held = (&state, scene.inertia);
-    let boundary = boundary::boundary(sides, &walls, &mesh, &units, held, sources)?;
+    let boundary = boundary::boundary(sides, (&walls, &slips), &mesh, &units, held, sources)?;
     let enclosure = walls.enclosure(&boundary, &mesh, &units);
     let forces = forces::force_gauges(&wanted, (&walls, &boundary), &mesh, &units);
 

@@ -1,8 +1,10 @@
 //! This module resolves `[boundaries]`: the conditions at the sides of the domain and their parts.
 
 use super::inflow::Candidates;
+use super::slip::wall_law;
 use super::values::{Result, coordinate, edge, finite_range};
 use crate::plan::boundary::{Conditions, Piece, SIDES, Side};
+use crate::plan::slip::Slip;
 use crate::scene::{
     Boundary, BoundaryKind, BoundaryPart, Field, FieldFn, Given, Scene, SceneError, Scope,
 };
@@ -49,7 +51,7 @@ impl Resolver<'_> {
     fn side(&self, boundary: &Boundary) -> Result<Side> {
         let name = &self.name;
         let rest = self.conditions(boundary.given(), name)?;
-        let periodic = boundary.kind == BoundaryKind::Periodic;
+        let periodic = boundary.kind == Some(BoundaryKind::Periodic);
         if periodic && !boundary.parts.is_empty() {
             return Err(SceneError::of_key(
                 format!("{name}.parts"),
@@ -74,7 +76,14 @@ impl Resolver<'_> {
     /// A part of the side.
     fn part(&self, part: &BoundaryPart, k: usize) -> Result<Piece> {
         let name = format!("{}.parts[{k}]", self.name);
-        if part.kind == BoundaryKind::Periodic {
+        if part.kind.is_none() && part.slip_length.is_none() {
+            return Err(SceneError::at(
+                &part.from,
+                format!("{name}: key `kind` is missing"),
+                "give it, such as kind = \"outflow\", or slip_length = <m>",
+            ));
+        }
+        if part.kind == Some(BoundaryKind::Periodic) {
             return Err(SceneError::of_key(
                 format!("{name}.kind"),
                 format!("{name} is periodic, but only whole sides can be"),
@@ -122,7 +131,7 @@ impl Resolver<'_> {
         given: Given,
         conditions: Conditions,
     ) -> Result<Piece> {
-        let open = self.open(given.kind, &conditions);
+        let open = self.open(given.kind(), &conditions);
         let mut piece = Piece { part, segment, conditions, open, enters: None };
         piece.enters = self.candidates.through(self.side, &piece, given)?;
         Ok(piece)
@@ -180,7 +189,9 @@ impl Resolver<'_> {
 
     /// The conditions that are written for the side or for a part of it, which is called `name`.
     fn conditions(&self, given: Given, name: &str) -> Result<Conditions> {
-        let Given { kind, velocity, traction, rotation, .. } = given;
+        let Given { velocity, traction, rotation, .. } = given;
+        let law = wall_law(given.wall, given.kind.is_some(), name, self.scope)?;
+        let kind = given.kind();
         if kind == BoundaryKind::Periodic {
             return match velocity.into_iter().chain(traction).chain([rotation]).flatten().next() {
                 None => Ok(Conditions::default()),
@@ -206,6 +217,18 @@ impl Resolver<'_> {
                 BoundaryKind::Open | BoundaryKind::Periodic => false,
             };
             let letter = ["x", "y"][c];
+            if let (Some(law), false) = (law, along_normal) {
+                if let Some(t) = traction[c] {
+                    return Err(SceneError::at(
+                        t,
+                        format!("{name} gives both slip_length and traction_{letter}"),
+                        "give one of them: the wall determines the traction along it",
+                    ));
+                }
+                let velocity = velocity[c].map(compile).transpose()?;
+                out.slip = Some(Slip { law, velocity });
+                continue;
+            }
             out.velocity[c] = match (velocity[c], traction[c]) {
                 (Some(v), None) => Some(compile(v)?),
                 (None, Some(_)) => None,

@@ -21,6 +21,8 @@ pub(in crate::plan) struct Walls {
 
 /// A block along mesh lines in SI coordinates.
 pub(in crate::plan) struct SiBlock {
+    /// Index among the blocks of the scene.
+    pub(in crate::plan) index: usize,
     pub(in crate::plan) name: String,
     /// Ranges along x and y, m.
     pub(in crate::plan) range: [[f64; 2]; 2],
@@ -29,6 +31,10 @@ pub(in crate::plan) struct SiBlock {
 
 /// A solid of any shape in SI coordinates.
 pub(in crate::plan) struct SiSolid {
+    /// Index among the walls or the blocks of the scene.
+    pub(in crate::plan) index: usize,
+    /// Whether it is a wall.
+    pub(in crate::plan) wall: bool,
     pub(in crate::plan) name: String,
     pub(in crate::plan) outline: Outline,
     pub(in crate::plan) kind: WallKind,
@@ -36,6 +42,8 @@ pub(in crate::plan) struct SiSolid {
 
 /// A wall in SI coordinates.
 pub(in crate::plan) struct SiWall {
+    /// Index among the walls of the scene.
+    pub(in crate::plan) index: usize,
     pub(in crate::plan) name: String,
     pub(in crate::plan) segment: Segment,
     pub(in crate::plan) kind: WallKind,
@@ -94,9 +102,9 @@ impl Walls {
         let mut errors = Vec::new();
         let mut walls = Vec::new();
         let mut solids = Vec::new();
-        for w in &scene.walls {
+        for (index, w) in scene.walls.iter().enumerate() {
             if let Some(thickness) = &w.thickness {
-                match thick(w, thickness, scope, domain) {
+                match thick((index, w), thickness, scope, domain) {
                     Ok(solid) => solids.push(solid),
                     Err(e) => errors.push(e),
                 }
@@ -108,14 +116,20 @@ impl Walls {
                 rotation,
             ) {
                 (Ok(segment), Ok(rotation)) => {
-                    walls.push(SiWall { name: w.name.clone(), segment, kind: w.kind, rotation });
+                    walls.push(SiWall {
+                        index,
+                        name: w.name.clone(),
+                        segment,
+                        kind: w.kind.unwrap_or_default(),
+                        rotation,
+                    });
                 }
                 (Err(e), _) | (_, Err(e)) => errors.push(e),
             }
         }
         let mut blocks = Vec::new();
-        for b in &scene.blocks {
-            match resolved(b, scope, domain) {
+        for (index, b) in scene.blocks.iter().enumerate() {
+            match resolved((index, b), scope, domain) {
                 Ok(Resolved::Aligned(block)) => blocks.push(block),
                 Ok(Resolved::Solid(solid)) => solids.push(solid),
                 Err(e) => errors.push(e),
@@ -190,12 +204,12 @@ enum Resolved {
     Solid(SiSolid),
 }
 
-fn resolved(b: &Block, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Resolved> {
+fn resolved((index, b): (usize, &Block), scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Resolved> {
     let what = format!("block `{}`", b.name);
-    let (name, kind) = (b.name.clone(), b.kind);
+    let (name, kind) = (b.name.clone(), b.kind.unwrap_or_default());
     let solid = |outline, place: &Quantity| {
         outlines::touches(&outline, domain, place, &what)?;
-        Ok(Resolved::Solid(SiSolid { name: name.clone(), outline, kind }))
+        Ok(Resolved::Solid(SiSolid { index, wall: false, name: name.clone(), outline, kind }))
     };
     let (x, y) = match (&b.x, &b.y, &b.shape) {
         (Some(x), Some(y), None) | (None, None, Some(SolidShape::Rectangle { x, y })) => (x, y),
@@ -224,11 +238,16 @@ fn resolved(b: &Block, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Resolved>
             ));
         }
     }
-    Ok(Resolved::Aligned(SiBlock { name, range, kind }))
+    Ok(Resolved::Aligned(SiBlock { index, name, range, kind }))
 }
 
 /// A wall with a thickness.
-fn thick(w: &Wall, thickness: &Quantity, scope: &Scope, domain: [[f64; 2]; 2]) -> Result<SiSolid> {
+fn thick(
+    (index, w): (usize, &Wall),
+    thickness: &Quantity,
+    scope: &Scope,
+    domain: [[f64; 2]; 2],
+) -> Result<SiSolid> {
     let what = format!("wall `{}`", w.name);
     if let Some(rotation) = &w.rotation {
         return Err(SceneError::at(
@@ -248,7 +267,13 @@ fn thick(w: &Wall, thickness: &Quantity, scope: &Scope, domain: [[f64; 2]; 2]) -
     let thickness = positive(thickness, scope, &format!("{what}: thickness"))?;
     let outline = outlines::around(from, to, thickness);
     outlines::touches(&outline, domain, &w.from[0], &what)?;
-    Ok(SiSolid { name: w.name.clone(), outline, kind: w.kind })
+    Ok(SiSolid {
+        index,
+        wall: true,
+        name: w.name.clone(),
+        outline,
+        kind: w.kind.unwrap_or_default(),
+    })
 }
 
 /// A free end of a wall.

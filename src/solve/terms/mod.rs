@@ -9,15 +9,18 @@
 //! | weight of the materials | [`weight`] | | yes |
 //! | inertia | [`inertia`] | yes | yes |
 //! | restoring force of stable stratification | [`restoring`] | yes | yes |
+//! | friction at walls along which material slips | [`slip`] | yes | yes |
 //! | body forces and tractions fixed in space | [`plan::loads`](crate::plan::loads) | | yes |
 //!
 //! The first three exist in every cell and are called by name. [`Terms`] lists the terms that only
-//! some scenes have.
+//! some scenes have; the friction at walls depends on the laws of the materials beside them and is part
+//! of the [`quadrature`](crate::solve::quadrature).
 
 pub mod inertia;
 pub mod pressure;
 pub mod restoring;
 pub mod rotation;
+pub mod slip;
 pub mod viscous;
 pub mod weight;
 
@@ -62,9 +65,25 @@ pub trait FaceTerm: Send + Sync {
     /// is an index into [`FaceTerm::faces`].
     fn entry(&self, face: usize, nodes: [usize; 2], components: [usize; 2]) -> f64;
 
-    /// Forces on the nodes of a face with the velocities `u`, and the power that they take from the
-    /// flow.
-    fn force(&self, face: usize, nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], f64);
+    /// Forces on the nodes of a face with the velocities `u`, and their powers.
+    fn force(&self, face: usize, nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], Powers);
+
+    /// Forces on the nodes of a face at rest that drive a flow.
+    fn drive(&self, _face: usize) -> [[f64; 2]; 3] {
+        [[0.0; 2]; 3]
+    }
+}
+
+/// Powers of the forces on a face. What the forces take from the flow is the sum of the first two less
+/// the third.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Powers {
+    /// Power of a numerical term.
+    pub numerical: f64,
+    /// Dissipated power.
+    pub dissipated: f64,
+    /// Power of the motion of a wall.
+    pub supplied: f64,
 }
 
 /// Terms that only some scenes have.

@@ -32,7 +32,7 @@
 //! fluid at rest below a fluid a million times thinner, this happens at a thousandth of the heavy
 //! fluid's relaxation time.
 
-use super::{CellFace, CellTerm, FaceTerm};
+use super::{CellFace, CellTerm, FaceTerm, Powers};
 use crate::solve::density::Density;
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Face;
@@ -187,7 +187,7 @@ impl FaceTerm for Restoring {
         self.strength[face] * LINE_MASS[k][l] * self.direction[c] * self.direction[d]
     }
 
-    fn force(&self, face: usize, nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], f64) {
+    fn force(&self, face: usize, nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], Powers) {
         let [ex, ey] = self.direction;
         let along = u.map(|u| u[0] * ex + u[1] * ey);
         let change: [f64; 3] = std::array::from_fn(|k| {
@@ -200,7 +200,7 @@ impl FaceTerm for Restoring {
             power += f * along[k];
             [-f * ex, -f * ey]
         });
-        (force, power)
+        (force, Powers { numerical: power, ..Powers::default() })
     }
 }
 

@@ -1,0 +1,62 @@
+//! This module resolves the laws of walls that are written instead of their kind: `slip_length`.
+
+use super::values::{Result, positive};
+use super::walls::SiSolid;
+use crate::plan::slip::WallLaw;
+use crate::scene::{GivenWall, Scene, SceneError, Scope};
+
+/// Laws of the walls and blocks of a scene, in SI units, in their order.
+pub(in crate::plan) struct Slips {
+    pub(in crate::plan) walls: Vec<Option<WallLaw>>,
+    pub(in crate::plan) blocks: Vec<Option<WallLaw>>,
+}
+
+impl Slips {
+    pub(super) fn new(scene: &Scene, scope: &Scope) -> Result<Slips> {
+        let walls = scene.walls.iter().map(|w| {
+            let given = GivenWall { slip_length: w.slip_length.as_ref() };
+            wall_law(given, w.kind.is_some(), &format!("wall `{}`", w.name), scope)
+        });
+        let blocks = scene.blocks.iter().map(|b| {
+            let given = GivenWall { slip_length: b.slip_length.as_ref() };
+            wall_law(given, b.kind.is_some(), &format!("block `{}`", b.name), scope)
+        });
+        Ok(Slips { walls: walls.collect::<Result<_>>()?, blocks: blocks.collect::<Result<_>>()? })
+    }
+}
+
+/// The law of the wall called `name`, if one is written. `kind`: whether its kind is written too.
+pub(super) fn wall_law(
+    given: GivenWall,
+    kind: bool,
+    name: &str,
+    scope: &Scope,
+) -> Result<Option<WallLaw>> {
+    let Some(q) = given.slip_length else { return Ok(None) };
+    if kind {
+        return Err(SceneError::at(
+            q,
+            format!("{name} gives both kind and slip_length"),
+            "give one of them: slip_length says how a wall resists, kind = \"free_slip\" that it does not",
+        ));
+    }
+    Ok(Some(WallLaw::Slip { length: positive(q, scope, &format!("{name}: slip_length"))? }))
+}
+
+impl Slips {
+    /// Law of a solid of any shape.
+    pub(in crate::plan) fn of(&self, solid: &SiSolid) -> Option<WallLaw> {
+        if solid.wall { self.walls[solid.index] } else { self.blocks[solid.index] }
+    }
+
+    /// Refuses laws of solids of any shape.
+    pub(super) fn refuse_on(&self, solids: &[SiSolid]) -> Result<()> {
+        let Some(solid) = solids.iter().find(|s| self.of(s).is_some()) else { return Ok(()) };
+        Err(SceneError::of_key(
+            format!("{}[{}]", if solid.wall { "walls" } else { "blocks" }, solid.index),
+            format!("`{}` is a solid of any shape and slips by a law", solid.name),
+            "slip_length and wall_friction act on walls along x or y: give kind = \"no_slip\" or \
+             \"free_slip\"",
+        ))
+    }
+}

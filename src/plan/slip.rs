@@ -1,0 +1,102 @@
+//! This module defines walls along which material slips.
+
+use super::{BoundaryPlan, Units};
+use crate::scene::FieldFn;
+use crate::space::mesh::{Axis, Mesh};
+use crate::space::segment::Segment;
+use crate::space::shape::{SIDE_NODES, side_normal};
+
+/// How a wall resists material that slides along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WallLaw {
+    /// Navier's law: traction `(eta/b) u` with the slip length `b`, m.
+    Slip {
+        /// Slip length, m (SI).
+        length: f64,
+    },
+}
+
+/// A wall law with the velocity of the wall.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slip {
+    /// The law.
+    pub law: WallLaw,
+    /// Velocity of the wall along itself, m/s, as a function of SI coordinates; zero if absent.
+    pub velocity: Option<FieldFn>,
+}
+
+/// A face of a cell that slides along a wall, in the plan's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlipFace {
+    /// The cell.
+    pub cell: usize,
+    /// Its side: left, right, bottom, top.
+    pub side: usize,
+    /// Law of the wall; a slip length is in the plan's units.
+    pub law: WallLaw,
+    /// Velocity of the wall along itself at the three nodes.
+    pub wall: [f64; 3],
+}
+
+impl WallLaw {
+    /// The law in the plan's units.
+    fn scaled(self, units: &Units) -> WallLaw {
+        match self {
+            WallLaw::Slip { length } => WallLaw::Slip { length: length / units.length },
+        }
+    }
+}
+
+impl BoundaryPlan {
+    /// The faces that slide along walls, in ascending order of their cells.
+    pub fn slip_faces(&self, mesh: &Mesh, units: &Units) -> Vec<SlipFace> {
+        let mut out = Vec::new();
+        for (side, piece) in self.pieces() {
+            let Some(Slip { law, velocity }) = &piece.conditions.slip else { continue };
+            let cells = piece.segment.cells_at_side(mesh, side);
+            out.extend(cells.filter(|&(_, cell)| !mesh.solid[cell]).map(|(_, cell)| {
+                let nodes = mesh.cell_nodes(cell);
+                let wall = SIDE_NODES[side].map(|a| {
+                    let [x, y] = mesh.node_position(nodes[a]).map(|v| v * units.length);
+                    velocity.as_ref().map_or(0.0, |f| f.at(x, y) / units.velocity())
+                });
+                SlipFace { cell, side, law: law.scaled(units), wall }
+            }));
+        }
+        for line in &self.walls {
+            let Some(law) = line.slip else { continue };
+            for (cell, side) in faces_of(&line.segment, mesh) {
+                out.push(SlipFace { cell, side, law: law.scaled(units), wall: [0.0; 3] });
+            }
+        }
+        out.sort_by_key(|f| (f.cell, f.side));
+        out
+    }
+}
+
+/// The faces of cells that are not solid on both sides of a segment along mesh lines.
+fn faces_of<'a>(
+    segment: &Segment,
+    mesh: &'a Mesh,
+) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+    let (across, along) = mesh.axes(segment.normal);
+    let normal = segment.normal;
+    let line = across.nearest_line(segment.at);
+    let count = across.cells();
+    let wrapped = |axis: &Axis, k: usize| if axis.periodic() { Some(k % count) } else { None };
+    let above = if line < count { Some(line) } else { wrapped(across, line) };
+    let below = if line > 0 { Some(line - 1) } else { wrapped(across, count - 1) };
+    let [from, to] = [segment.from, segment.to].map(|v| along.nearest_line(v));
+    let both = [(above, 2 * normal), (below, 2 * normal + 1)];
+    both.into_iter()
+        .filter_map(|(cell, side)| Some((cell?, side)))
+        .flat_map(move |(cell, side)| {
+            (from..to).map(move |k| (mesh.cell_across(normal, cell, k), side))
+        })
+        .filter(|&(cell, _)| !mesh.solid[cell])
+}
+
+/// Component of the velocity along a side.
+pub fn tangent(side: usize) -> usize {
+    1 - side_normal(side)
+}
