@@ -400,6 +400,22 @@ material = "sand"
             "top.parts[0].slip_length",
             "boundaries.top.parts=[{ from = 0.1, to = 0.5, slip_length = 1 }]",
         ),
+        (
+            "left.parts[0].wall_friction",
+            "boundaries.left.parts=[{ from = 0.1, to = 0.5, wall_friction = 1 }]",
+        ),
+        (
+            "right.parts[0].wall_friction",
+            "boundaries.right.parts=[{ from = 0.1, to = 0.5, wall_friction = 1 }]",
+        ),
+        (
+            "bottom.parts[0].wall_friction",
+            "boundaries.bottom.parts=[{ from = 0.1, to = 0.5, wall_friction = 1 }]",
+        ),
+        (
+            "top.parts[0].wall_friction",
+            "boundaries.top.parts=[{ from = 0.1, to = 0.5, wall_friction = 1 }]",
+        ),
         ("sources[0]", "boundaries.top.kind=open"),
         (
             "sources[0]",

@@ -14,6 +14,11 @@ pub enum WallLaw {
         /// Slip length, m (SI).
         length: f64,
     },
+    /// Coulomb's law: traction up to `mu N` with the normal stress `N`.
+    Friction {
+        /// Coefficient of friction mu.
+        coefficient: f64,
+    },
 }
 
 /// A wall law with the velocity of the wall.
@@ -43,6 +48,7 @@ impl WallLaw {
     fn scaled(self, units: &Units) -> WallLaw {
         match self {
             WallLaw::Slip { length } => WallLaw::Slip { length: length / units.length },
+            law @ WallLaw::Friction { .. } => law,
         }
     }
 }

@@ -1,7 +1,12 @@
 //! This module defines what enters through sides and nozzles.
 
+use super::Plan;
 use crate::scene::FieldFn;
+use crate::space::constraints::Constraints;
 use crate::space::segment::Segment;
+
+/// Times that differ by less than this share of the run are one, as in the plan's stops.
+const TINY: f64 = 2e-9;
 
 /// What enters through a piece of a side or through a nozzle.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,5 +38,21 @@ impl Source {
     pub fn is_on(&self, now: f64, tiny: f64) -> bool {
         let [from, to] = self.times;
         now >= from - tiny && now < to - tiny
+    }
+}
+
+impl Plan {
+    /// Which sources are on after a time, in the plan's units.
+    pub fn sources_on(&self, time: f64) -> Vec<bool> {
+        self.boundary.sources.iter().map(|s| s.is_on(time, TINY * self.clock.end)).collect()
+    }
+
+    /// Prescribed nodal values while the given sources are on.
+    pub fn constraints_while<const D: usize>(&self, on: &[bool]) -> Constraints<D> {
+        let all = &self.boundary.sources;
+        let is_on = |s: &_| all.iter().zip(on).any(|(other, &on)| on && std::ptr::eq(other, s));
+        let mut out = self.boundary.constraints_with::<D>(&self.mesh, &self.units, is_on);
+        out.refer(self.pressure_reference);
+        out
     }
 }

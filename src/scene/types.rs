@@ -603,6 +603,11 @@ pub struct Boundary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
     pub slip_length: Option<Quantity>,
+    /// Coefficient of friction mu_w of Coulomb's law, instead of `kind`: zero normal velocity, and a
+    /// traction along the wall of mu_w times the normal stress on it where material slides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.3]))]
+    pub wall_friction: Option<Quantity>,
     /// Prescribed velocity along x; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
@@ -686,13 +691,18 @@ pub struct BoundaryPart {
     pub to: Quantity,
     /// Kind of boundary condition; not `periodic`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-default" = "required, or `slip_length`", "examples" = ["outflow"]))]
+    #[schemars(extend("x-default" = "required, or `slip_length`, or `wall_friction`", "examples" = ["outflow"]))]
     pub kind: Option<BoundaryKind>,
     /// Slip length b of Navier's law, instead of `kind`: zero normal velocity, and the velocity along
     /// the wall, relative to it, is b times its derivative across; the traction is (eta/b) u.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
     pub slip_length: Option<Quantity>,
+    /// Coefficient of friction mu_w of Coulomb's law, instead of `kind`: zero normal velocity, and a
+    /// traction along the wall of mu_w times the normal stress on it where material slides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.3]))]
+    pub wall_friction: Option<Quantity>,
     /// Prescribed velocity along x; may depend on x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
@@ -758,7 +768,25 @@ pub struct BoundaryPart {
 pub struct GivenWall<'a> {
     /// Slip length.
     pub slip_length: Option<&'a Quantity>,
+    /// Coefficient of friction.
+    pub wall_friction: Option<&'a Quantity>,
 }
+
+/// Implements `given` for types that have the keys of a wall.
+macro_rules! given_wall {
+    ($($type:ty),*) => {$(
+        impl $type {
+            /// The law of the wall that is written here.
+            pub fn given(&self) -> GivenWall<'_> {
+                GivenWall {
+                    slip_length: self.slip_length.as_ref(),
+                    wall_friction: self.wall_friction.as_ref(),
+                }
+            }
+        }
+    )*};
+}
+given_wall!(Wall, Block);
 
 /// Conditions that are written for a side or for a part of it.
 #[derive(Clone, Copy, Debug)]
@@ -787,7 +815,10 @@ macro_rules! given {
             pub fn given(&self) -> Given<'_> {
                 Given {
                     kind: self.kind,
-                    wall: GivenWall { slip_length: self.slip_length.as_ref() },
+                    wall: GivenWall {
+                        slip_length: self.slip_length.as_ref(),
+                        wall_friction: self.wall_friction.as_ref(),
+                    },
                     velocity: [self.velocity_x.as_ref(), self.velocity_y.as_ref()],
                     traction: [self.traction_x.as_ref(), self.traction_y.as_ref()],
                     rotation: self.rotation.as_ref(),
@@ -868,6 +899,11 @@ pub struct Wall {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
     pub slip_length: Option<Quantity>,
+    /// Coefficient of friction mu_w of Coulomb's law, instead of `kind`: zero normal velocity, and a
+    /// traction along the wall of mu_w times the normal stress on it where material slides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.3]))]
+    pub wall_friction: Option<Quantity>,
     /// Prescribed Cosserat rotation rate on the wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
@@ -981,6 +1017,11 @@ pub struct Block {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-unit" = "m", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.01]))]
     pub slip_length: Option<Quantity>,
+    /// Coefficient of friction mu_w of Coulomb's law, instead of `kind`: zero normal velocity, and a
+    /// traction along the wall of mu_w times the normal stress on it where material slides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "1", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.3]))]
+    pub wall_friction: Option<Quantity>,
 }
 
 /// A nozzle: a solid block, one cell thick, that pushes material in through one of its faces. An

@@ -7,7 +7,6 @@ use super::initial;
 use super::interest::Interest;
 use super::phases::Phases;
 use super::row::Row;
-use super::sources;
 use crate::motion::advect::Displacements;
 use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
@@ -125,8 +124,8 @@ impl<const D: usize> Simulation<D> {
     pub fn new(plan: Arc<Plan>) -> Result<Self, SimError> {
         let clock = Instant::now();
         let mesh = plan.mesh.clone();
-        let sources_on = sources::on(&plan, 0.0);
-        let constraints = sources::constraints::<D>(&plan, &sources_on);
+        let sources_on = plan.sources_on(0.0);
+        let constraints = plan.constraints_while::<D>(&sources_on);
         let mut quadrature =
             Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len());
         quadrature.bind_walls(|cell| constraints.fixed_sides(&mesh, cell));
@@ -219,5 +218,55 @@ impl<const D: usize> Simulation<D> {
     /// The report of the last solution.
     pub fn report(&self) -> &Report {
         &self.report
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneSource;
+    use crate::{plan, scene};
+
+    /// Grains in a column of unit width, whose base descends: where they slide along the walls
+    /// everywhere, the friction bears their weight, and the normal stress on the walls is
+    /// `rho g L/(2 mu_w)` (Janssen 1895), although the pressure differs from it.
+    #[test]
+    fn the_normal_stress_on_the_walls_of_a_deep_column_saturates() {
+        let text = "schema = 1\nname = \"column\"\ngravity = [0, -10]\n[domain]\nx = [0, 1]\n\
+                    y = [0, 6]\n[accuracy]\ncells = 8\n[time]\nsteady = true\n[materials.grains]\n\
+                    density = 1000\nfriction = { static = 0.8, grain_diameter = 1e-3 }\n[[regions]]\n\
+                    material = \"grains\"\n[boundaries]\nleft.wall_friction = MU\n\
+                    right.wall_friction = MU\nbottom.velocity_y = -0.1\ntop.kind = \"open\"\n";
+        for mu in [0.4, 0.5, 0.7] {
+            let source = SceneSource::new("column", text.replace("MU", &mu.to_string()));
+            let plan = plan::resolve(&scene::parse(&source).expect("valid")).expect("valid");
+            let sim = Simulation::<2>::new(Arc::new(plan)).expect("solved");
+            let (mesh, slip) = (&sim.plan.mesh, sim.quadrature.slip());
+            let unit = [sim.plan.units.length, sim.plan.units.stress()];
+            let last = 1e4 / (2.0 * mu);
+            let mut rows = vec![];
+            for face in 0..slip.len() {
+                let y = mesh.cell_centre(slip.wall(face).cell)[1] * unit[0];
+                let normal = slip.normal_stresses(face).map(|n| n * unit[1]);
+                let mean = (5.0 * (normal[0] + normal[2]) + 8.0 * normal[1]) / 18.0;
+                rows.push((y, mean));
+            }
+            let between = |low: f64, high: f64| {
+                let own: Vec<f64> =
+                    rows.iter().filter(|r| r.0 > low && r.0 < high).map(|r| r.1).collect();
+                own.iter().sum::<f64>() / own.len() as f64
+            };
+            // 0.981, 0.994 and 0.998 of the limit.
+            let deep = between(0.75, 1.75);
+            assert!((deep / last - 1.0).abs() < 0.03, "{mu}: {deep} {last}");
+            // With the normal stress equal across the column it follows
+            // `rho g L/(2 mu_w) (1 - exp(-2 mu_w z/L))` with the depth `z`; found within 1.5 %.
+            for k in 0..8 {
+                let (low, high) = (0.75 + 0.5 * f64::from(k), 1.25 + 0.5 * f64::from(k));
+                let janssen = last * (1.0 - (-2.0 * mu * (5.75 - low)).exp());
+                let found = between(low, high);
+                assert!((found / janssen - 1.0).abs() < 0.02, "{mu}, {low}: {found} {janssen}");
+            }
+        }
     }
 }

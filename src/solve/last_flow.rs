@@ -2,6 +2,7 @@
 
 use super::element::{PointShape, rates};
 use crate::laws::LocalFlow;
+use crate::space::flow::interpolate;
 use crate::space::mesh::Mesh;
 use crate::space::shape::Shape;
 
@@ -10,6 +11,10 @@ pub trait LastFlow: Sync {
     /// Rates and pressure at the reference coordinates `r` of a cell, in the plan's units; `None`
     /// if no flow is known.
     fn at(&self, cell: usize, r: [f64; 2]) -> Option<LocalFlow>;
+
+    /// Velocity and pressure at the reference coordinates `r` of a cell, in the plan's units; `None`
+    /// if no flow is known.
+    fn beside(&self, cell: usize, r: [f64; 2]) -> Option<([f64; 2], f64)>;
 }
 
 /// No flow is known.
@@ -17,6 +22,10 @@ pub struct NoFlow;
 
 impl LastFlow for NoFlow {
     fn at(&self, _cell: usize, _r: [f64; 2]) -> Option<LocalFlow> {
+        None
+    }
+
+    fn beside(&self, _cell: usize, _r: [f64; 2]) -> Option<([f64; 2], f64)> {
         None
     }
 }
@@ -31,12 +40,22 @@ pub struct Iterate<'a, const D: usize> {
     pub pressure: &'a [[f64; 3]],
 }
 
+impl<const D: usize> Iterate<'_, D> {
+    fn pressure_at(&self, cell: usize, r: [f64; 2]) -> f64 {
+        let basis = self.mesh.measure().pressure_basis(r);
+        self.pressure[cell].iter().zip(basis).map(|(p, q)| p * q).sum()
+    }
+}
+
 impl<const D: usize> LastFlow for Iterate<'_, D> {
     fn at(&self, cell: usize, r: [f64; 2]) -> Option<LocalFlow> {
         let shape = PointShape::new(&Shape::at(r), self.mesh.cell_size(cell));
-        let basis = self.mesh.measure().pressure_basis(r);
-        let pressure = self.pressure[cell].iter().zip(basis).map(|(p, q)| p * q).sum();
         let nodal = self.mesh.cell_nodes(cell).map(|n| self.velocity[n]);
-        Some(LocalFlow { rates: rates(&shape, &nodal), pressure })
+        Some(LocalFlow { rates: rates(&shape, &nodal), pressure: self.pressure_at(cell, r) })
+    }
+
+    fn beside(&self, cell: usize, r: [f64; 2]) -> Option<([f64; 2], f64)> {
+        let nodal = self.mesh.cell_nodes(cell).map(|n| [self.velocity[n][0], self.velocity[n][1]]);
+        Some((interpolate(&nodal, &Shape::values(r)), self.pressure_at(cell, r)))
     }
 }

@@ -24,3 +24,4 @@ pub mod softening;
 pub mod stokes;
 pub mod symbolic;
 pub mod terms;
+mod wall_laws;

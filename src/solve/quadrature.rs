@@ -32,7 +32,6 @@ use crate::composition::{Composition, Content, EmptyCell, Kind, SCRATCH};
 use crate::laws::point::PointLaw;
 use crate::laws::rates::Rates;
 use crate::plan::material::Material;
-use crate::plan::slip::SlipFace;
 use crate::scene::Quadrature as Rule;
 use crate::space::constraints::FixedSides;
 use crate::space::kink::Kink;
@@ -79,7 +78,7 @@ pub struct Quadrature {
     /// Whether the element matrices have these derivatives.
     pub(super) softened: bool,
     /// Walls along which material slips.
-    slip: SlipFaces,
+    pub(super) slip: SlipFaces,
     /// Volume factors of the materials in the last update.
     factors: Vec<f64>,
     /// Whether each cell is evaluated.
@@ -150,17 +149,6 @@ impl Quadrature {
         out
     }
 
-    /// Declares the faces along which material slips.
-    pub fn bind_slip(&mut self, mesh: &Mesh, faces: Vec<SlipFace>) {
-        self.slip = SlipFaces::new(mesh, faces);
-        self.slip.evaluate(&self.mean_viscosity);
-    }
-
-    /// Walls along which material slips.
-    pub fn slip(&self) -> &SlipFaces {
-        &self.slip
-    }
-
     /// Declares the sides of each cell on which the velocity is prescribed.
     pub fn bind_walls(&mut self, fixed: impl Fn(usize) -> FixedSides) {
         self.walls.iter_mut().enumerate().for_each(|(cell, walls)| *walls = fixed(cell));
@@ -218,16 +206,16 @@ impl Quadrature {
     }
 
     /// Sets the directions of the stresses to those of the current rates.
-    pub fn align(&mut self) {
+    pub(super) fn align_cells(&mut self) {
         self.directions.resize_with(self.softening.len(), Vec::new);
         threads::for_each(&mut self.directions, GRAIN, |cell, directions| {
             softening::aligned(&self.softening[cell], directions);
         });
     }
 
-    /// Keeps the current derivatives for [`Quadrature::turn`]; the laws must be evaluated again
+    /// Keeps the current derivatives for [`Quadrature::turn_cells`]; the laws must be evaluated again
     /// before it.
-    pub fn keep_softening(&mut self) {
+    pub(super) fn keep_softening_of_cells(&mut self) {
         self.softening_before.resize_with(self.softening.len(), Vec::new);
         std::mem::swap(&mut self.softening_before, &mut self.softening);
         // Cells that are not evaluated again have none.
@@ -235,7 +223,7 @@ impl Quadrature {
     }
 
     /// Advances the directions of the stresses after the share `share` of a correction.
-    pub fn turn(&mut self, share: f64) {
+    pub(super) fn turn_cells(&mut self, share: f64) {
         threads::for_each(&mut self.directions, GRAIN, |cell, directions| {
             let [before, after] = [&self.softening_before, &self.softening].map(|s| &s[cell]);
             softening::advance(before, after, share, directions);
@@ -290,20 +278,7 @@ impl Quadrature {
     ///
     /// # Errors
     /// Returns [`EmptyCell`] if a cell has neither particles nor a background material.
-    pub fn update(
-        &mut self,
-        mesh: &Mesh,
-        particles: &Particles,
-        materials: &[Material],
-        version: u32,
-        flow: &dyn LastFlow,
-    ) -> Result<(), EmptyCell> {
-        self.update_cells(mesh, particles, materials, version, flow)?;
-        self.slip.evaluate(&self.mean_viscosity);
-        Ok(())
-    }
-
-    fn update_cells(
+    pub(super) fn update_cells(
         &mut self,
         mesh: &Mesh,
         particles: &Particles,
@@ -342,19 +317,8 @@ impl Quadrature {
     }
 
     /// Evaluates the cells with laws that depend on the flow again, with another iterate and
-    /// otherwise the arguments of the last [`Quadrature::update`].
-    pub fn reevaluate(
-        &mut self,
-        mesh: &Mesh,
-        particles: &Particles,
-        materials: &[Material],
-        flow: &dyn LastFlow,
-    ) {
-        self.reevaluate_cells(mesh, particles, materials, flow);
-        self.slip.evaluate(&self.mean_viscosity);
-    }
-
-    fn reevaluate_cells(
+    /// otherwise the arguments of the last [`Quadrature::update_cells`].
+    pub(super) fn reevaluate_cells(
         &mut self,
         mesh: &Mesh,
         particles: &Particles,

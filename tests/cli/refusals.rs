@@ -288,6 +288,12 @@ const FAULTS: &[Fault] = &[
     ),
     (
         "left.kind = \"free_slip\"",
+        "left = { slip_length = 0.015, wall_friction = 0.35 }",
+        "0.35",
+        &["boundaries.left gives both slip_length and wall_friction", "give one of them"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
         "left.slip_length = -0.5",
         "-0.5",
         &["boundaries.left: slip_length is -0.5", "above zero"],
@@ -296,7 +302,7 @@ const FAULTS: &[Fault] = &[
         "left.kind = \"free_slip\"",
         "left = { slip_length = 0.5, traction_y = 3.5 }",
         "3.5",
-        &["boundaries.left gives both slip_length and traction_y", "the wall determines"],
+        &["boundaries.left gives both a law of the wall and traction_y", "the wall determines"],
     ),
     (
         "bottom.kind = \"free_slip\"",

@@ -76,11 +76,11 @@ impl Resolver<'_> {
     /// A part of the side.
     fn part(&self, part: &BoundaryPart, k: usize) -> Result<Piece> {
         let name = format!("{}.parts[{k}]", self.name);
-        if part.kind.is_none() && part.slip_length.is_none() {
+        if part.kind.is_none() && part.slip_length.is_none() && part.wall_friction.is_none() {
             return Err(SceneError::at(
                 &part.from,
                 format!("{name}: key `kind` is missing"),
-                "give it, such as kind = \"outflow\", or slip_length = <m>",
+                "give it, such as kind = \"outflow\", or slip_length = <m>, or wall_friction",
             ));
         }
         if part.kind == Some(BoundaryKind::Periodic) {
@@ -221,7 +221,7 @@ impl Resolver<'_> {
                 if let Some(t) = traction[c] {
                     return Err(SceneError::at(
                         t,
-                        format!("{name} gives both slip_length and traction_{letter}"),
+                        format!("{name} gives both a law of the wall and traction_{letter}"),
                         "give one of them: the wall determines the traction along it",
                     ));
                 }

@@ -1,4 +1,5 @@
-//! This module resolves the laws of walls that are written instead of their kind: `slip_length`.
+//! This module resolves the laws of walls that are written instead of their kind: `slip_length` and
+//! `wall_friction`.
 
 use super::values::{Result, positive};
 use super::walls::SiSolid;
@@ -13,14 +14,14 @@ pub(in crate::plan) struct Slips {
 
 impl Slips {
     pub(super) fn new(scene: &Scene, scope: &Scope) -> Result<Slips> {
-        let walls = scene.walls.iter().map(|w| {
-            let given = GivenWall { slip_length: w.slip_length.as_ref() };
-            wall_law(given, w.kind.is_some(), &format!("wall `{}`", w.name), scope)
-        });
-        let blocks = scene.blocks.iter().map(|b| {
-            let given = GivenWall { slip_length: b.slip_length.as_ref() };
-            wall_law(given, b.kind.is_some(), &format!("block `{}`", b.name), scope)
-        });
+        let walls = scene
+            .walls
+            .iter()
+            .map(|w| wall_law(w.given(), w.kind.is_some(), &format!("wall `{}`", w.name), scope));
+        let blocks = scene
+            .blocks
+            .iter()
+            .map(|b| wall_law(b.given(), b.kind.is_some(), &format!("block `{}`", b.name), scope));
         Ok(Slips { walls: walls.collect::<Result<_>>()?, blocks: blocks.collect::<Result<_>>()? })
     }
 }
@@ -32,15 +33,32 @@ pub(super) fn wall_law(
     name: &str,
     scope: &Scope,
 ) -> Result<Option<WallLaw>> {
-    let Some(q) = given.slip_length else { return Ok(None) };
+    let (key, q) = match (given.slip_length, given.wall_friction) {
+        (None, None) => return Ok(None),
+        (Some(_), Some(q)) => {
+            return Err(SceneError::at(
+                q,
+                format!("{name} gives both slip_length and wall_friction"),
+                "give one of them: the friction of a fluid grows with its slip, that of grains does not",
+            ));
+        }
+        (Some(q), None) => ("slip_length", q),
+        (None, Some(q)) => ("wall_friction", q),
+    };
     if kind {
         return Err(SceneError::at(
             q,
-            format!("{name} gives both kind and slip_length"),
-            "give one of them: slip_length says how a wall resists, kind = \"free_slip\" that it does not",
+            format!("{name} gives both kind and {key}"),
+            format!(
+                "give one of them: {key} says how a wall resists, kind = \"free_slip\" that it does not"
+            ),
         ));
     }
-    Ok(Some(WallLaw::Slip { length: positive(q, scope, &format!("{name}: slip_length"))? }))
+    let value = positive(q, scope, &format!("{name}: {key}"))?;
+    Ok(Some(match given.slip_length {
+        Some(_) => WallLaw::Slip { length: value },
+        None => WallLaw::Friction { coefficient: value },
+    }))
 }
 
 impl Slips {

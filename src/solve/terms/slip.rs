@@ -1,11 +1,25 @@
 //! This module computes the friction at walls along which material slips.
 //!
 //! ```text
-//! traction on the material   t = -(eta/b) (u - w)      (Navier)
+//! Navier   t = -(eta/b) s                         s = u - w
+//! Coulomb  t = -mu N s/|s|  where it slides,  |t| <= mu N where it sticks
+//!          N = max(0, p - tau_nn)
 //! ```
-//! along the wall, with the slip length `b`, the velocity `w` of the wall and the mean viscosity `eta`
-//! of the cell at the wall. In a shear flow beside a wall at rest, `u = b du/dn`. C. L. M. H. Navier,
-//! "Memoire sur les lois du mouvement des fluides", Mem. Acad. Sci. Inst. France 6 (1823) 389.
+//! along the wall, with the velocity `w` of the wall, the slip length `b`, the mean viscosity `eta` of the
+//! cell, the coefficient of friction `mu`, and the normal stress `N` on the wall, from the pressure `p` and
+//! the viscous normal stress `tau_nn` at the nearest integration point. In a shear flow beside a wall at
+//! rest, Navier's law is `u = b du/dn`. C. L. M. H. Navier, "Memoire sur les lois du mouvement des fluides",
+//! Mem. Acad. Sci. Inst. France 6 (1823) 389.
+//!
+//! As the viscosity of a material that yields, the resistance of a wall with friction is bounded: by the
+//! largest viscosity over the size of the cell, `r_max`. At fixed `N` the friction is
+//!
+//! ```text
+//! t = -r s,   r = mu N/m,   m = max(|s|, mu N/r_max)
+//! ```
+//! the derivative of a convex function of the slip. Its direction `q`, which is `s/m` at the solution, is an
+//! unknown of its own, as those of the stresses in [`softening`](crate::solve::softening): the matrix has
+//! `r (1 - x q s/|s|)` with `x = 1` where the material slides and 0 elsewhere.
 //!
 //! The integral over a face is exact for biquadratic velocities: three Gauss points.
 
@@ -13,6 +27,59 @@ use super::{CellFace, FaceTerm, Powers};
 use crate::plan::slip::{SlipFace, WallLaw, tangent};
 use crate::space::mesh::Mesh;
 use crate::space::shape::{GAUSS_3_WEIGHTS, VALUES_AT_GAUSS, side_normal};
+
+/// Smallest share of the resistance that the matrix has where material slides, so that friction alone
+/// can hold a body.
+const LEAST: f64 = 1e-3;
+
+/// Number of points of a face.
+const POINTS: usize = 3;
+
+/// What is beside a face.
+#[derive(Clone, Debug, Default)]
+pub struct Beside {
+    /// Mean viscosity of the cell.
+    pub viscosity: f64,
+    /// Largest resistance to slip, for friction.
+    pub largest: f64,
+    /// Volume fraction of the materials that rub: all but the background.
+    pub share: f64,
+    /// Velocity and pressure at the points of the face; `None` if no flow is known.
+    pub flow: Option<[([f64; 2], f64); POINTS]>,
+}
+
+/// Friction at a point of a face.
+#[derive(Clone, Copy, Debug, Default)]
+struct Contact {
+    /// Force per area and velocity, `r`.
+    resistance: f64,
+    /// Slip `s`.
+    slip: f64,
+    /// `m`; zero without friction.
+    effective: f64,
+    /// Direction `q`.
+    direction: f64,
+    /// Viscous normal stress `tau_nn`.
+    normal: f64,
+    /// Normal stress `N` on the wall.
+    pressing: f64,
+}
+
+impl Contact {
+    fn slides(&self) -> bool {
+        self.effective > 0.0 && self.slip.abs() >= self.effective
+    }
+
+    /// The entry of the matrix, force per area and velocity.
+    fn tangent(&self) -> f64 {
+        if self.slides() {
+            let along = (1.0 - self.direction * self.slip.signum()).max(LEAST);
+            self.resistance * along
+        } else {
+            self.resistance
+        }
+    }
+}
 
 /// The faces of cells along which material slips.
 #[derive(Clone, Debug, Default)]
@@ -22,8 +89,11 @@ pub struct SlipFaces {
     walls: Vec<SlipFace>,
     /// Area of each face.
     area: Vec<f64>,
-    /// Force per area and velocity at the three points of each face.
-    resistance: Vec<[f64; 3]>,
+    contacts: Vec<[Contact; POINTS]>,
+    /// Those of the last matrices, while a correction is applied.
+    before: Vec<[Contact; POINTS]>,
+    /// Whether a wall has friction.
+    friction: bool,
 }
 
 impl SlipFaces {
@@ -31,16 +101,89 @@ impl SlipFaces {
     pub fn new(mesh: &Mesh, walls: Vec<SlipFace>) -> Self {
         let faces = walls.iter().map(|w| CellFace { cell: w.cell, side: w.side }).collect();
         let area = walls.iter().map(|w| mesh.face_area(w.cell, side_normal(w.side))).collect();
-        let resistance = vec![[0.0; 3]; walls.len()];
-        SlipFaces { faces, walls, area, resistance }
+        let contacts = vec![[Contact::default(); POINTS]; walls.len()];
+        let friction = walls.iter().any(|w| matches!(w.law, WallLaw::Friction { .. }));
+        SlipFaces { faces, walls, area, contacts, before: vec![], friction }
     }
 
-    /// Evaluates the laws of the walls with the mean viscosities of the cells.
-    pub fn evaluate(&mut self, viscosity: &[f64]) {
-        for (wall, resistance) in self.walls.iter().zip(&mut self.resistance) {
-            *resistance = match wall.law {
-                WallLaw::Slip { length } => [viscosity[wall.cell] / length; 3],
+    /// Number of faces.
+    pub fn len(&self) -> usize {
+        self.walls.len()
+    }
+
+    /// A face.
+    pub fn wall(&self, face: usize) -> &SlipFace {
+        &self.walls[face]
+    }
+
+    /// Normal stresses on the wall at the points of a face with friction.
+    pub fn normal_stresses(&self, face: usize) -> [f64; POINTS] {
+        self.contacts[face].map(|c| c.pressing)
+    }
+
+    /// Whether a wall has friction, so that its resistance depends on the flow.
+    pub fn has_friction(&self) -> bool {
+        self.friction
+    }
+
+    /// Evaluates the law of a face.
+    pub fn evaluate(&mut self, face: usize, beside: &Beside) {
+        let wall = &self.walls[face];
+        let along = tangent(wall.side);
+        for (k, contact) in self.contacts[face].iter_mut().enumerate() {
+            let coefficient = match wall.law {
+                WallLaw::Slip { length } => {
+                    contact.resistance = beside.viscosity / length;
+                    continue;
+                }
+                WallLaw::Friction { coefficient } => coefficient,
             };
+            // Without a flow, everything sticks.
+            contact.resistance = beside.largest;
+            let Some((u, pressure)) = beside.flow.map(|f| f[k]) else { continue };
+            let moving: f64 = VALUES_AT_GAUSS[k].iter().zip(wall.wall).map(|(n, w)| n * w).sum();
+            contact.slip = u[along] - moving;
+            contact.pressing = (pressure - contact.normal).max(0.0);
+            let strength = coefficient * beside.share * contact.pressing;
+            let sticks = strength / beside.largest;
+            contact.effective = contact.slip.abs().max(sticks);
+            contact.resistance =
+                if contact.effective > 0.0 { strength / contact.effective } else { 0.0 };
+        }
+    }
+
+    /// Takes a share of the change of the viscous normal stresses at the points of a face.
+    pub fn press(&mut self, face: usize, share: f64, normal: [f64; POINTS]) {
+        for (contact, normal) in self.contacts[face].iter_mut().zip(normal) {
+            contact.normal += share * (normal - contact.normal);
+        }
+    }
+
+    /// Gives the frictions the directions of the slip.
+    pub fn align(&mut self) {
+        for contact in self.contacts.as_flattened_mut() {
+            contact.direction =
+                if contact.effective > 0.0 { contact.slip / contact.effective } else { 0.0 };
+        }
+    }
+
+    /// Keeps the current contacts for [`SlipFaces::turn`].
+    pub fn keep(&mut self) {
+        self.before.clone_from(&self.contacts);
+    }
+
+    /// Advances the directions after the share `share` of a correction.
+    pub fn turn(&mut self, share: f64) {
+        let now = self.contacts.as_flattened_mut().iter_mut();
+        for (contact, before) in now.zip(self.before.as_flattened()) {
+            if before.effective == 0.0 {
+                continue;
+            }
+            let (q, change) = (before.direction, contact.slip - before.slip);
+            let turn = if before.slides() { before.slip.signum() * change } else { 0.0 };
+            let step = change - turn * q + share * (before.slip - q * before.effective);
+            let next = q + step / before.effective;
+            contact.direction = if next.is_finite() { next.clamp(-1.0, 1.0) } else { 0.0 };
         }
     }
 }
@@ -55,19 +198,20 @@ impl FaceTerm for SlipFaces {
         if c != along || d != along {
             return 0.0;
         }
-        let points = self.resistance[face].iter().zip(GAUSS_3_WEIGHTS).zip(VALUES_AT_GAUSS);
-        self.area[face] * points.map(|((r, weight), n)| r * weight * n[k] * n[l]).sum::<f64>()
+        let points = self.contacts[face].iter().zip(GAUSS_3_WEIGHTS).zip(VALUES_AT_GAUSS);
+        let sum: f64 = points.map(|((c, weight), n)| c.tangent() * weight * n[k] * n[l]).sum();
+        self.area[face] * sum
     }
 
     fn force(&self, face: usize, _nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], Powers) {
         let along = tangent(self.faces[face].side);
         let wall = &self.walls[face].wall;
         let (mut force, mut powers) = ([[0.0; 2]; 3], Powers::default());
-        let points = self.resistance[face].iter().zip(GAUSS_3_WEIGHTS).zip(VALUES_AT_GAUSS);
-        for ((resistance, weight), n) in points {
+        let points = self.contacts[face].iter().zip(GAUSS_3_WEIGHTS).zip(VALUES_AT_GAUSS);
+        for ((contact, weight), n) in points {
             let at = |values: [f64; 3]| -> f64 { n.iter().zip(values).map(|(n, v)| n * v).sum() };
             let [moving, slip] = [at(*wall), at(u.map(|u| u[along])) - at(*wall)];
-            let friction = self.area[face] * weight * resistance * slip;
+            let friction = self.area[face] * weight * contact.resistance * slip;
             for (force, n) in force.iter_mut().zip(n) {
                 force[along] -= friction * n;
             }
@@ -95,7 +239,7 @@ mod tests {
         for (cell, side) in [(0, 0), (1, 1), (0, 2), (5, 3)] {
             let wall = [0.2, -0.4, 1.1];
             let mut slip = SlipFaces::new(&mesh, vec![SlipFace { cell, side, law, wall }]);
-            slip.evaluate(&[2.0; 6]);
+            slip.evaluate(0, &Beside { viscosity: 2.0, ..Beside::default() });
             let u = [[0.3, 0.9], [-0.2, 0.5], [0.7, -0.1]];
             let (force, powers) = slip.force(0, [0; 3], u);
             let taken: f64 = (0..3).map(|k| -force[k][0] * u[k][0] - force[k][1] * u[k][1]).sum();
@@ -118,5 +262,35 @@ mod tests {
                 (0..3).map(|k| still[k][tangent(side)] - uniform[k][tangent(side)]).sum();
             assert!((sum - 2.0 / 0.3 * 0.7).abs() < 1e-12);
         }
+    }
+
+    /// At fixed normal stress the friction is the derivative of a convex function of the slip: it rises
+    /// to `mu N` and stays there.
+    #[test]
+    fn friction_sticks_below_its_strength_and_slides_at_it() {
+        let axis = || Axis::new(vec![0.0, 1.0], false);
+        let mesh = Mesh::new(axis(), axis());
+        let law = WallLaw::Friction { coefficient: 0.4 };
+        let wall = SlipFace { cell: 0, side: 2, law, wall: [0.5; 3] };
+        let mut slip = SlipFaces::new(&mesh, vec![wall]);
+        slip.press(0, 1.0, [-1.0; 3]);
+        let mut friction = |u: f64, pressure: f64| {
+            let flow = Some([([u, 0.0], pressure); 3]);
+            let beside = Beside { viscosity: 1.0, largest: 100.0, share: 1.0, flow };
+            slip.evaluate(0, &beside);
+            slip.align();
+            let force: f64 = slip.force(0, [0; 3], [[u, 0.0]; 3]).0.iter().map(|f| f[0]).sum();
+            (force, slip.entry(0, [1, 1], [0, 0]))
+        };
+        // N = 1.5 + 1, so that it sticks up to a slip of 0.01.
+        let (force, stick) = friction(0.505, 1.5);
+        assert!((force + 0.5).abs() < 1e-12, "{force}");
+        let (force, slide) = friction(0.7, 1.5);
+        assert!((force + 1.0).abs() < 1e-12, "{force}");
+        assert!(slide < 1e-3 * stick, "{slide} {stick}");
+        let (force, _) = friction(-3.0, 1.5);
+        assert!((force - 1.0).abs() < 1e-12, "{force}");
+        // Nothing pulls the material onto the wall.
+        assert_eq!(friction(2.0, -1.5).0, 0.0);
     }
 }
