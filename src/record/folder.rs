@@ -347,13 +347,39 @@ fn kind(name: &str) -> Kind<'static> {
 
 /// Whether a scene file has no comments, as those that runs write.
 fn is_bare(scene: &Path) -> bool {
-    fs::read_to_string(scene).is_ok_and(|text| !text.contains('#'))
+    fs::read_to_string(scene).is_ok_and(|text| !text.lines().any(has_comment))
+}
+
+/// Whether a line of TOML has a comment: a `#` outside of strings, such as those of colours.
+fn has_comment(line: &str) -> bool {
+    let mut quote = None;
+    let mut escaped = false;
+    for c in line.chars() {
+        match (quote, c) {
+            (None, '#') => return true,
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(q), _) if c == q && !escaped => quote = None,
+            _ => {}
+        }
+        escaped = quote == Some('"') && c == '\\' && !escaped;
+    }
+    false
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::TempFolder;
+
+    #[test]
+    fn comments_are_told_from_colours() {
+        for line in ["colour = \"#e69f00\"", "name = 'a # b'", "a = \"\\\"#\"", ""] {
+            assert!(!has_comment(line), "{line}");
+        }
+        for line in ["# note", "colour = \"#e69f00\" # orange", "a = 1 # b"] {
+            assert!(has_comment(line), "{line}");
+        }
+    }
 
     #[test]
     fn a_folder_has_one_writer() {

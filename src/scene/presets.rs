@@ -5,7 +5,7 @@ use super::load::parse;
 use super::source::SceneSource;
 
 /// Names and TOML texts of the presets.
-const PRESETS: [(&str, &str); 16] = [
+const PRESETS: [(&str, &str); 19] = [
     ("silo", include_str!("../../presets/silo.toml")),
     ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
     ("couette_cosserat", include_str!("../../presets/couette_cosserat.toml")),
@@ -22,6 +22,9 @@ const PRESETS: [(&str, &str); 16] = [
     ("incline", include_str!("../../presets/incline.toml")),
     ("bingham_slump", include_str!("../../presets/bingham_slump.toml")),
     ("pour", include_str!("../../presets/pour.toml")),
+    ("hopper", include_str!("../../presets/hopper.toml")),
+    ("funnel_stones", include_str!("../../presets/funnel_stones.toml")),
+    ("flow_past_cylinder", include_str!("../../presets/flow_past_cylinder.toml")),
 ];
 
 /// Names and one-line descriptions of the presets, in display order.

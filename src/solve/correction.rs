@@ -151,7 +151,7 @@ impl<const D: usize> Stokes<D> {
             if self.mesh.solid[c] {
                 return [0.0];
             }
-            let mass = self.mesh.cell_measure(c).pressure_mass();
+            let mass = self.mesh.divergence_mass(c);
             [(0..3).map(|q| a[c][q] * b[c][q] / mass[q]).sum()]
         });
         sum

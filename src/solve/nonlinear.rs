@@ -178,7 +178,7 @@ impl<const D: usize> Stokes<D> {
         loop {
             let clock = Instant::now();
             self.constraints.remove_null_space(&self.mesh, flow);
-            flow.continue_slopes(&self.mesh, loads.weight);
+            flow.continue_slopes(&self.mesh, loads.weight, &quadrature.mean_viscosity);
             let near = report.decrement.is_some_and(|d| d <= NEAR) && updates < most_updates;
             if near {
                 // The pressure may alternate about the solution; the mean of two iterates does not.

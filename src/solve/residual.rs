@@ -115,6 +115,7 @@ impl<const D: usize> Stokes<D> {
         let u = nodes.map(|n| flow.velocity[n]);
         let divergence = Divergence::new(&self.mesh, cell);
         let mass = self.mesh.cell_measure(cell).pressure_mass();
+        let weights = self.mesh.divergence_mass(cell);
         let relations = self.constraints.embedding();
         let pressure = flow.pressure[cell];
         let compliance = quadrature.compliance[cell];
@@ -144,7 +145,7 @@ impl<const D: usize> Stokes<D> {
             let needed = pressure[q] / penalty;
             penalty_norm += needed * needed / mass[q];
             pressure_square += mass[q] * pressure[q] * pressure[q];
-            divergence_norm += rp * rp / mass[q];
+            divergence_norm += rp * rp / weights[q];
             share.divergence[q] = rp;
         }
         let dissipation = internal.dissipation + compliance * pressure_square;

@@ -40,6 +40,7 @@ use crate::simd::Simd;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
 use crate::space::mesh::Mesh;
+use crate::space::parts::Parts;
 use crate::threads;
 use std::sync::Arc;
 use std::time::Instant;
@@ -138,6 +139,15 @@ impl<const D: usize> Stokes<D> {
                 out[node][..2].copy_from_slice(&force[..2]);
             }
         }
+        // The pressure on outlines does no work on the flow.
+        for (cell, part) in self.mesh.parts().into_iter().flat_map(Parts::all) {
+            for (a, &node) in self.incidence.nodes[cell].iter().enumerate() {
+                for c in 0..2 {
+                    let pressure = flow.pressure[cell].iter().zip(&part.outline);
+                    out[node][c] += pressure.map(|(p, row)| p * row[c][a]).sum::<f64>();
+                }
+            }
+        }
         self.work = work;
     }
 
@@ -152,7 +162,7 @@ impl<const D: usize> Stokes<D> {
         let &Given { quadrature, loads, stopping } = given;
         let load = loads.nodal;
         let (mut further, mut continued) = (0, 0);
-        flow.continue_slopes(&self.mesh, loads.weight);
+        flow.continue_slopes(&self.mesh, loads.weight, &quadrature.mean_viscosity);
         loop {
             self.residual(quadrature, loads, flow, work);
             let residual = &work.residual;
@@ -169,7 +179,8 @@ impl<const D: usize> Stokes<D> {
             let converged = balanced
                 && report.divergence <= stopping.tolerance * (1.0 + PRESSURE_SHARE * slack);
             if converged && continued < MOST_CONTINUATIONS && self.mesh.parts().is_some() {
-                let change = flow.continue_slopes(&self.mesh, loads.weight);
+                let change =
+                    flow.continue_slopes(&self.mesh, loads.weight, &quadrature.mean_viscosity);
                 if change > CONTINUED * flow.largest_pressure() {
                     continued += 1;
                     work.kept = 0;

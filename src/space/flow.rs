@@ -40,10 +40,11 @@ impl<const D: usize> Flow<D> {
         a + b * xi + c * eta
     }
 
-    /// Gives the pressure of cells with solids in them the slope of its neighbours, with the
-    /// difference of the weights per volume, by cell. Returns the largest change, as a difference of
-    /// pressures in a cell.
-    pub fn continue_slopes(&mut self, mesh: &Mesh, weight: &[[f64; 2]]) -> f64 {
+    /// Gives the pressure of cells with solids in them its slope: it balances the weight per volume of
+    /// the cell, and besides has the part of the slope of its neighbours that viscous stresses balance,
+    /// less by the ratio of the viscosities where the cell is the less viscous. `weight` and `viscosity`
+    /// are those of all cells. Returns the largest change, as a difference of pressures in a cell.
+    pub fn continue_slopes(&mut self, mesh: &Mesh, weight: &[[f64; 2]], viscosity: &[f64]) -> f64 {
         let Some(parts) = mesh.parts() else { return 0.0 };
         let weight = |cell: usize| weight.get(cell).copied().unwrap_or([0.0; 2]);
         let mut largest = 0.0f64;
@@ -51,8 +52,9 @@ impl<const D: usize> Flow<D> {
             let mut slope = [0.0; 2];
             for &n in &part.beside {
                 let size = mesh.cell_size(n);
+                let less = (viscosity[cell] / viscosity[n]).min(1.0);
                 for c in 0..2 {
-                    let rest = 2.0 * self.pressure[n][1 + c] / size[c] - weight(n)[c];
+                    let rest = less * (2.0 * self.pressure[n][1 + c] / size[c] - weight(n)[c]);
                     slope[c] += rest / part.beside.len() as f64;
                 }
             }

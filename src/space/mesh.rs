@@ -233,6 +233,11 @@ impl Mesh {
         let whole = self.measure.of_cell(self.cell_size(cell));
         self.part(cell).map_or(whole, |part| whole.part(part.fraction))
     }
+    /// Mass of the pressure basis by which divergences are weighted. That of a sliver beside a solid is
+    /// that of a cell: what flows into it by rounding is little beside the volume of cells.
+    pub fn divergence_mass(&self, cell: usize) -> [f64; 3] {
+        self.measure.of_cell(self.cell_size(cell)).pressure_mass()
+    }
     /// The solids of any shape, with the free parts of cells, if there are any.
     pub fn parts(&self) -> Option<&Parts> {
         self.parts.as_deref()

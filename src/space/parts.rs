@@ -43,6 +43,9 @@ pub struct Part {
     /// Divergence matrix for `q = 1, xi, eta` without the flow through the outline: the integral of
     /// `q N_a n_c` over the free parts of the sides, less that of `N_a dq/dx_c` over the part.
     pub divergence: [[[f64; NODES]; 2]; 3],
+    /// Integral of `q N_a n_c` over the outline, with its normal `n` into the solid: the force of the
+    /// pressure on the solid.
+    pub outline: [[[f64; NODES]; 2]; 3],
     /// Neighbours without solids, whose pressure has the slope of this one.
     pub beside: Vec<usize>,
     /// Streamfunction of the velocity in it, where a single wall crosses the cell.

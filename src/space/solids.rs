@@ -180,6 +180,17 @@ fn part(
     sides: &[Vec<Weighted>; 4],
     unresolved: bool,
 ) -> Part {
+    // The integral of `q dN_a/dx_c` over the part.
+    let mut whole = [[[0.0; NODES]; 2]; 3];
+    for (r, weight) in &rule {
+        let (volume, shape) = (cell.of_point(*weight), Shape::at(*r));
+        for (row, q) in whole.iter_mut().zip([1.0, r[0], r[1]]) {
+            for a in 0..NODES {
+                row[0][a] += volume * q * shape.d_xi[a] * 2.0 / cell.size[0];
+                row[1][a] += volume * q * shape.d_eta[a] * 2.0 / cell.size[1];
+            }
+        }
+    }
     let mut points = [PartPoint { weight: 0.0, r: [0.0; 2], shape: Shape::at([0.0; 2]) }; 9];
     for (point, (r, weight)) in points.iter_mut().zip(reduced(rule)) {
         *point = PartPoint { weight: weight / fraction, r, shape: Shape::at(r) };
@@ -203,7 +214,10 @@ fn part(
             row.zip(p.shape.n).for_each(|(entry, n)| *entry -= volume * slope * n);
         }
     }
-    Part { fraction, points, divergence, beside: vec![], stream: None, unresolved }
+    let outline = std::array::from_fn(|q| {
+        [0, 1].map(|c| std::array::from_fn(|a| whole[q][c][a] - divergence[q][c][a]))
+    });
+    Part { fraction, points, divergence, outline, beside: vec![], stream: None, unresolved }
 }
 
 #[cfg(test)]

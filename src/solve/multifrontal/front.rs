@@ -173,6 +173,10 @@ impl Matrix<'_> {
     /// Returns the index of an unknown whose pivot is not positive and finite.
     pub fn eliminate(&mut self, simd: Simd) -> Result<(), usize> {
         let Size { own, rim } = self.size;
+        if own == 0 {
+            // All own unknowns lie inside of solids.
+            return Ok(());
+        }
         let ld = own + rim;
         let mut k = 0;
         while k < own {
