@@ -65,6 +65,7 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
         EffectKind::Acceleration | EffectKind::CutCells => return None,
         EffectKind::CarriedViscosity | EffectKind::CarriedDensity => return None,
         EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => return None,
+        EffectKind::Slip | EffectKind::Inflow => return None,
     }
     // The quantity of interest may have been removed with the effect.
     s.interest = None;
@@ -132,6 +133,7 @@ pub fn measure(plan: &Arc<Plan>, list: &mut EffectList, steps: u32) -> Result<()
         e.share = match e.kind {
             EffectKind::Flow | EffectKind::CarriedDensity | EffectKind::CarriedViscosity => None,
             EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => None,
+            EffectKind::Slip | EffectKind::Inflow => None,
             // Computed once, at the start.
             EffectKind::BodyForce => Some(0.0),
             EffectKind::Gravity | EffectKind::Acceleration => Some(phases.weight / total),

@@ -6,13 +6,14 @@ use crate::scene::Quadrature;
 use serde::Serialize;
 
 /// Stages that a steady flow does not have.
-const MOVING: [&str; 6] = [
+const MOVING: [&str; 7] = [
     "advection",
     "population control",
     "director turning",
     "restoring loads",
     "volume change",
     "dye",
+    "inflow",
 ];
 
 /// Effects that a scene may need.
@@ -50,6 +51,10 @@ pub enum EffectKind {
     PressureZero,
     /// Inertia.
     Inertia,
+    /// Slip along walls.
+    Slip,
+    /// Material that enters through sides and nozzles.
+    Inflow,
 }
 
 impl EffectKind {
@@ -73,6 +78,8 @@ impl EffectKind {
             FlowCurves => "flow curves",
             PressureZero => "the zero of the pressure",
             Inertia => "inertia",
+            Slip => "slip at walls",
+            Inflow => "inflow",
         }
     }
 }
@@ -379,6 +386,11 @@ impl Plan {
         add(PressureZero, given, reason, 0, 0, &[]);
         let yes = "`inertia = true`; the rotation of grains has no inertia".to_string();
         add(Inertia, e.inertia, why(e.inertia, yes, self.no_inertia()), 0, 0, &["momentum"]);
+        let slips = self.slips();
+        let no = "no side, wall or block has slip_length or wall_friction";
+        add(Slip, !slips.is_empty(), why(!slips.is_empty(), slips, no), 0, 0, &[]);
+        let (inflow, no) = (self.inflow(), "nothing enters through sides or [[sources]]");
+        add(Inflow, !inflow.is_empty(), why(!inflow.is_empty(), inflow, no), 0, 0, &["inflow"]);
         list
     }
 }

@@ -1,8 +1,10 @@
-//! This module states why flow curves, the zero of the pressure and inertia are solved or not, for
-//! `grainscope plan`.
+//! This module states why flow curves, the zero of the pressure, inertia, slip and inflow are solved or
+//! not, for `grainscope plan`.
 
 use super::Plan;
+use super::boundary::place_of;
 use super::material::Material;
+use super::slip::WallLaw;
 use crate::laws::flow_curve::{FlowCurve, Strength};
 
 /// A number with three digits.
@@ -62,5 +64,38 @@ impl Plan {
     /// Why inertia is not solved.
     pub(super) fn no_inertia(&self) -> &'static str {
         if self.scene.inertia { "nothing has a density" } else { "creeping flow" }
+    }
+
+    /// The places along which material slips, with the laws there; empty if there are none.
+    pub(super) fn slips(&self) -> String {
+        let law = |law: &WallLaw| match law {
+            WallLaw::Slip { length } => format!("slip length {} m", short(*length)),
+            WallLaw::Friction { coefficient } => format!("friction {}", short(*coefficient)),
+        };
+        let sides = self.boundary.pieces().filter_map(|(s, piece)| {
+            let slip = piece.conditions.slip.as_ref()?;
+            Some(format!("{}: {}", place_of(s, piece), law(&slip.law)))
+        });
+        let mut list: Vec<String> = sides.collect();
+        let mut others: Vec<String> =
+            self.boundary.walls.iter().filter_map(|w| w.slip.as_ref()).map(law).collect();
+        others.dedup();
+        list.extend(others.iter().map(|law| format!("walls and blocks: {law}")));
+        list.dedup();
+        list.join("; ")
+    }
+
+    /// What enters, and where; empty if nothing does.
+    pub(super) fn inflow(&self) -> String {
+        let name = |m: u8| &self.state.materials[usize::from(m)].name;
+        let sides = self.boundary.pieces().filter_map(|(s, piece)| {
+            let entering = piece.enters.as_ref()?;
+            Some(format!("{} through {}", name(entering.material), place_of(s, piece)))
+        });
+        let sources = self.boundary.sources.iter();
+        let sources = sources.map(|s| format!("{} from `{}`", name(s.entering.material), s.name));
+        let mut list: Vec<String> = sides.chain(sources).collect();
+        list.dedup();
+        list.join("; ")
     }
 }

@@ -54,6 +54,14 @@ impl WallLaw {
 }
 
 impl BoundaryPlan {
+    /// Whether a side, a wall or a block has friction, which depends on the pressure.
+    pub fn has_wall_friction(&self) -> bool {
+        let rubs = |law: &WallLaw| matches!(law, WallLaw::Friction { .. });
+        let sides = self.pieces().filter_map(|(_, piece)| piece.conditions.slip.as_ref());
+        let walls = self.walls.iter().filter_map(|w| w.slip.as_ref());
+        sides.map(|s| &s.law).chain(walls).any(rubs)
+    }
+
     /// The faces that slide along walls, in ascending order of their cells.
     pub fn slip_faces(&self, mesh: &Mesh, units: &Units) -> Vec<SlipFace> {
         let mut out = Vec::new();

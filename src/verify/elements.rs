@@ -5,7 +5,7 @@ use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number, rate};
 use crate::cases::{
     Case, CaseError, Drive, Errors, Fluid, SolCx, Wave, couette, coupled_cell, layered_cell,
-    poiseuille, solcx, steady_vortex_without_particles,
+    poiseuille, slip_cell, solcx, steady_vortex_without_particles,
 };
 
 /// Numbers of cells per side.
@@ -33,6 +33,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         solcx(SolCx { contrast: 1e6, jump: 0.5 }, Drive::BodyForce)?,
         layered_cell(Wave { x: 1, y: 2 }, 10.0),
         steady_vortex_without_particles(),
+        slip_cell(0.2),
     ];
     let mut table = Table::new(
         "",

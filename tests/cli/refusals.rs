@@ -294,6 +294,12 @@ const FAULTS: &[Fault] = &[
     ),
     (
         "left.kind = \"free_slip\"",
+        "left.wall_friction = 0.5",
+        "",
+        &["a wall has friction, but nothing determines the pressure on it", "[pressure_reference]"],
+    ),
+    (
+        "left.kind = \"free_slip\"",
         "left.slip_length = -0.5",
         "-0.5",
         &["boundaries.left: slip_length is -0.5", "above zero"],

@@ -1,7 +1,8 @@
 //! This module resolves `[pressure_reference]`, which determines the pressure of a closed scene.
 //!
 //! The pressure of a closed scene is determined only up to a constant. Its mean is zero unless
-//! friction, for which the zero of the pressure matters, or the scene gives it at a point.
+//! friction, of grains or at walls, for which the zero of the pressure matters, or the scene gives it at a
+//! point.
 
 use super::values::{Result, point};
 use crate::plan::{BoundaryPlan, Region, Units};
@@ -39,13 +40,22 @@ pub(super) fn reference(
         return Ok(Some(PressurePoint { at, value: value / units.stress() }));
     }
     let grains = scene.materials.iter().find(|(_, m)| m.friction.is_some());
-    let Some((name, _)) = grains.filter(|_| boundary.closed) else { return Ok(None) };
+    let (key, what, whose) = match grains {
+        _ if !boundary.closed => return Ok(None),
+        Some((name, _)) => {
+            (format!("materials.{name}.friction"), format!("`{name}` has"), "its pressure")
+        }
+        None if boundary.has_wall_friction() => {
+            ("boundaries".into(), "a wall has".into(), "the pressure on it")
+        }
+        None => return Ok(None),
+    };
     let Some(at) = highest_background(scene, scope, (mesh, units), regions)? else {
         return Err(SceneError::of_key(
-            format!("materials.{name}.friction"),
+            key,
             format!(
-                "`{name}` has friction, but nothing determines its pressure: the domain is closed, \
-                 and no background touches the grains"
+                "{what} friction, but nothing determines {whose}: the domain is closed, and no \
+                 background touches the grains"
             ),
             "give [pressure_reference] with at = [x, y] and value = <Pa>, open a side, or give \
              a background",
