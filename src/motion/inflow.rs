@@ -128,14 +128,14 @@ impl Inflow {
         &self,
         plan: &Plan,
         (velocity, dt): (&[[f64; 2]], f64),
-        &Face { cell, side, entering }: &Face,
+        &Face { cell: home, side, entering }: &Face,
         k: usize,
         mut add: impl FnMut(Entry),
     ) {
         let mesh = &*plan.mesh;
         let normal = side_normal(side);
         let outwards = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
-        let nodes = mesh.cell_nodes(cell);
+        let nodes = mesh.cell_nodes(home);
         let nodal = SIDE_NODES[side].map(|a| velocity[nodes[a]]);
         let at = |t: f64, c: usize| -> f64 {
             Shape::line(t).into_iter().zip(nodal).map(|(n, u)| n * u[c]).sum()
@@ -143,14 +143,14 @@ impl Inflow {
         let width = 2.0 / self.particles_along as f64;
         let low = -1.0 + k as f64 * width;
         let [middle, high] = [low + 0.5 * width, low + width];
-        // Simpson's rule is exact for quadratic functions.
         // Nothing enters through what a solid covers.
         let free = |t: f64| {
             let r = if normal == 0 { [outwards, t] } else { [t, outwards] };
-            !mesh.is_solid_in(cell, mesh.from_reference(cell, r))
+            !mesh.is_solid_in(home, mesh.from_reference(home, r))
         };
         let mean = |c: usize| {
-            if mesh.part(cell).is_none() {
+            if mesh.part(home).is_none() {
+                // Simpson's rule is exact for quadratic functions.
                 return (at(low, c) + 4.0 * at(middle, c) + at(high, c)) / 6.0;
             }
             let pieces = (0..PIECES).map(|k| low + width * (k as f64 + 0.5) / PIECES as f64);
@@ -160,23 +160,31 @@ impl Inflow {
         if speed <= 0.0 {
             return;
         }
-        let size = mesh.cell_size(cell);
-        let volume = dt * speed * mesh.face_area(cell, normal) / self.particles_along as f64;
-        // A step crosses at most a cell; a longer way would end in another cell.
-        let depth = (dt * speed / size[normal]).min(1.0);
+        let size = mesh.cell_size(home);
+        let volume = dt * speed * mesh.face_area(home, normal) / self.particles_along as f64;
+        // Where cells are made smaller by grading, a step crosses several of them.
+        let depth = dt * speed / size[normal];
         let drift = 2.0 * dt * mean(1 - normal) / size[1 - normal];
         let point = |inside: f64, along: f64| {
             let across = outwards * (1.0 - 2.0 * inside);
             let r = if normal == 0 { [across, along] } else { [along, across] };
-            mesh.from_reference(cell, r)
+            mesh.from_reference(home, r)
         };
         let material = self.entering[entering].material;
         let carried = self.carried(plan, &self.entering[entering], point(0.0, middle));
-        let parts = (volume / self.usual(mesh, cell)).ceil().max(1.0);
+        let parts = (volume / self.usual(mesh, home)).ceil().max(1.0);
         for part in 0..parts as usize {
             let share = (part as f64 + 0.5) / parts;
             let along = (middle + share * drift).clamp(-INSIDE, INSIDE);
-            let (mut at, from) = (point(share * depth, along), point(-share * depth, middle));
+            let inside = share * depth;
+            let (mut cell, mut at) = (home, point(inside, along));
+            if inside >= 1.0 {
+                cell = mesh.locate(at);
+                if mesh.solid[cell] {
+                    (cell, at) = (home, point(0.5 * (1.0 + INSIDE), along));
+                }
+            }
+            let from = point(-inside, middle);
             if let Some(part) = mesh.part(cell)
                 && mesh.is_solid_in(cell, at)
             {

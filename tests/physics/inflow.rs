@@ -211,3 +211,32 @@ fn what_enters_has_the_momentum_of_the_given_velocity() {
     assert!(errors[0] < 1e-3 && errors[1] < errors[0] / 3.0, "{errors:?}");
     assert!(errors[2] < errors[1] / 3.0, "{errors:?}");
 }
+
+/// Water is pushed through a part of a side into air. The mesh is graded towards the ends of the part,
+/// so that a step crosses several of its cells.
+#[test]
+fn a_jet_keeps_its_speed_and_fills_the_cells_that_it_crosses() {
+    let text = "schema = 1\nname = \"jet\"\ninertia = true\n[domain]\nx = [0, 2]\ny = [0, 1]\n\
+                [accuracy]\ncells = 12\n[time]\nend = 0.8\nmax_step = 0.03\n[recording]\nframes = 1\n\
+                [materials.water]\ndensity = 1000\nshear_viscosity = 1\n[materials.air]\ndensity = 1\n\
+                shear_viscosity = 0.02\nbackground = true\n[[regions]]\nmaterial = \"air\"\n\
+                [boundaries]\nright.kind = \"open\"\ntop.kind = \"open\"\nbottom.kind = \"open\"\n\
+                left.kind = \"no_slip\"\n[[boundaries.left.parts]]\nfrom = 0.375\nto = 0.625\n\
+                kind = \"no_slip\"\nvelocity_x = 1\ninflow = \"water\"\n";
+    let mut run = scene(text, &[]);
+    let rate = flux(run.as_ref(), 0, 0.0, [0.375, 0.625]);
+    finish(run.as_mut(), |_| {});
+    let plan = run.plan();
+    let water = plan.state.materials.iter().position(|m| m.name == "water").unwrap();
+    let p = run.particles();
+    let own = (0..p.len()).filter(|&k| usize::from(p.material[k]) == water);
+    let (mut sum, mut volume) = (0.0, 0.0);
+    for k in own {
+        sum += p.volume[k] * p.position[k][0] * plan.units.length;
+        volume += p.volume[k];
+    }
+    assert!((volume * plan.units.area() - 0.8 * rate).abs() < 1e-12);
+    let centre = sum / volume;
+    assert!((centre - 0.4).abs() < 0.02, "{centre}");
+    assert_eq!(run.count().healed, 0);
+}

@@ -37,7 +37,8 @@ impl Candidates<'_> {
         let normal = side_normal(side);
         let inwards = inward_velocity(side, piece);
         let Some(wanted) = given.inflow else {
-            if !piece.open || self.scene.time.steady {
+            let outwards = inwards.is_some_and(|v| v < 0.0);
+            if !piece.open || self.scene.time.steady || outwards {
                 return Ok(None);
             }
             let pushed = given.velocity[normal].filter(|_| inwards.is_some_and(|v| v > 0.0));
