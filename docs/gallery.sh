@@ -22,6 +22,8 @@ for name in $("$program" presets | awk '{print $1}'); do
         shear_alignment) look=(--colour alignment) ;;
         couette_cosserat | poiseuille_cosserat) look=(--field rotation) ;;
         solcx | solvi) look=(--field pressure) ;;
+        hopper) look=(--colour speed) ;;
+        flow_past_cylinder) look=(--field speed) ;;
         layer_stack) look=(--field speed) ;;
         *) look=() ;;
     esac

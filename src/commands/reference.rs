@@ -476,6 +476,10 @@ material = "sand"
         if path.starts_with("blocks[0].shape") {
             text = text.replace("x = [1.5, 2]\ny = [0, 0.25]\n", solid(path));
         }
+        if path == "gauges[0].on" {
+            let flow = text.find("from = [0.9, 0.5]").unwrap_or(text.len());
+            text.truncate(flow);
+        }
         let base = SceneSource::new("box", text);
         let needed = NEEDED.iter().filter(|(part, _)| path.contains(part));
         let base = needed.fold(base, |s, (_, needed)| set(s, needed.to_string()));

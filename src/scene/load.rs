@@ -330,7 +330,7 @@ mod tests {
         "down" | "dwn" | "dwn" | unknown choice `dwn` | did you mean `down`?
         density = 1e6 | density = true | true | boolean `true` | a number or an expression
         density = 1e6 | density = nan | nan | NaN is not finite | a finite number
-        direction = "down" | | no place | key `direction` is missing in | add `direction
+        name = "outflow" | | no place | key `name` is missing in | add `name
         [0, -10] | [0] | [0] | invalid length 1 in `gravity` | an array of length 2
         [0, -10] | [0, 1, 2] | [0 | a list of 3 values | expected 2 values
         ["-aperture/2" | [1, "-aperture/2" | [ | a list of 3 values | expected 2 values

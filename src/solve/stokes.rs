@@ -49,9 +49,9 @@ use std::time::Instant;
 const POWER_TOLERANCE: f64 = 1e-9;
 /// Change of the pressures that are continued into cells with solids, relative to the largest
 /// pressure, below which they are not continued again.
-const CONTINUED: f64 = 1e-6;
+const CONTINUED: f64 = 1e-5;
 /// Largest number of times that they are continued in a solution.
-const MOST_CONTINUATIONS: u32 = 20;
+const MOST_CONTINUATIONS: u32 = 8;
 /// Largest number of further corrections that reduce the error of the balance of powers.
 const POWER_CORRECTIONS: u32 = 3;
 
@@ -162,6 +162,8 @@ impl<const D: usize> Stokes<D> {
         let &Given { quadrature, loads, stopping } = given;
         let load = loads.nodal;
         let (mut further, mut continued) = (0, 0);
+        // Number of corrections when the pressures were continued last.
+        let mut begun = 0;
         flow.continue_slopes(&self.mesh, loads.weight, &quadrature.mean_viscosity);
         loop {
             self.residual(quadrature, loads, flow, work);
@@ -183,6 +185,7 @@ impl<const D: usize> Stokes<D> {
                     flow.continue_slopes(&self.mesh, loads.weight, &quadrature.mean_viscosity);
                 if change > CONTINUED * flow.largest_pressure() {
                     continued += 1;
+                    begun = report.corrections;
                     work.kept = 0;
                     continue;
                 }
@@ -192,7 +195,7 @@ impl<const D: usize> Stokes<D> {
                     return Ok(());
                 }
                 further += 1;
-            } else if report.corrections >= stopping.max_corrections {
+            } else if report.corrections - begun >= stopping.max_corrections {
                 return Err(self.stalled(residual, report, stopping.tolerance));
             }
             self.correct(quadrature, work);

@@ -182,6 +182,10 @@ impl Population {
             let least = (part.fraction * self.target() as f64 / 2.0).ceil() as usize;
             return Need { least, quadrants: false };
         }
+        if mesh.block(cell).any(|c| mesh.part(c).is_some()) {
+            // Beside slanted walls the flow thins out the particles of single cells.
+            return self.largest_need();
+        }
         let carries = particles.director.is_some()
             || particles.viscosity.is_some()
             || particles.density.is_some();

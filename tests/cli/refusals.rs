@@ -51,6 +51,48 @@ type Fault<'a> = (&'a str, &'a str, &'a str, &'a [&'a str]);
 
 const FAULTS: &[Fault] = &[
     (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[blocks]]\nname = \"stone\"\nshape.polygon = [[0.6, 0.3], [1, 0.6], [1, 0.3], [0.6, 0.6]]\n[[walls]]\nname = \"left_wall\"",
+        "1, 0.3",
+        &["block `stone`: the polygon crosses itself", "order of the outline"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[blocks]]\nname = \"stone\"\nshape.polygon = [[0.6, 0.3], [1, 0.6]]\n[[walls]]\nname = \"left_wall\"",
+        "0.6, 0.3",
+        &["a polygon of 2 corners", "three corners or more"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[blocks]]\nname = \"stone\"\nshape.polygon = [[0.6, 0.3], [1, 0.3], [1, 0.3], [0.6, 0.6]]\n[[walls]]\nname = \"left_wall\"",
+        "",
+        &["corners 1 and 2 are the same point", "remove one"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[blocks]]\nname = \"stone\"\nshape.circle = { centre = [4, 0.5], radius = 0.1 }\n[[walls]]\nname = \"left_wall\"",
+        "4, 0.5",
+        &["block `stone` lies outside the domain", "move it"],
+    ),
+    (
+        "to = [0.5, 0.75]",
+        "to = [0.7, 0.75]",
+        "0.7",
+        &["wall `left_wall` is slanted", "thickness = 0.05"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[gauges]]\nname = \"force\"\non = \"left_wal\"\n[[walls]]\nname = \"left_wall\"",
+        "\"left_wal\"",
+        &["there is no side, wall or block `left_wal`", "did you mean `left_wall`?"],
+    ),
+    (
+        "[[walls]]\nname = \"left_wall\"",
+        "[[gauges]]\nname = \"force\"\non = \"left_wall\"\nmaterial = \"sand\"\n[[walls]]\nname = \"left_wall\"",
+        "",
+        &["gauge `force` has both `on` and `material`", "remove one of the two"],
+    ),
+    (
         "shear_viscosity = 100",
         "shear_viscosity = -5",
         "-5",

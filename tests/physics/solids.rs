@@ -46,9 +46,9 @@ fn hopper(extra: &str) -> Box<dyn Run> {
          density = 1000\n[materials.air]\nshear_viscosity = 0.1\ndensity = 1\nbackground = true\n\
          [[regions]]\nmaterial = \"mud\"\nshape.rectangle = {{ x = [-1, 1], y = [0, 1.5] }}\n\
          [boundaries]\nleft.kind = \"no_slip\"\nright.kind = \"no_slip\"\ntop.kind = \"open\"\n\
-         [[blocks]]\nname = \"left\"\nkind = \"no_slip\"\n\
+         [[blocks]]\nname = \"hl\"\nkind = \"no_slip\"\n\
          shape.polygon = [[-1, 1.2], [-0.3, 0.3], [-0.3, 0], [-1, 0]]\n\
-         [[blocks]]\nname = \"right\"\nkind = \"no_slip\"\n\
+         [[blocks]]\nname = \"hr\"\nkind = \"no_slip\"\n\
          shape.polygon = [[1, 1.2], [0.3, 0.3], [0.3, 0], [1, 0]]\n{extra}"
     );
     crate::scene(&text, &[])
@@ -80,7 +80,8 @@ fn a_hopper_loses_nothing_and_stays_symmetric() {
     }
     let row = run.row();
     assert!(row.gauges[0].volume > 0.1, "{}", row.gauges[0].volume);
-    assert!(row.volume_error < 0.2, "{}", row.volume_error);
+    // With rectangular steps instead of slopes it is 0.3.
+    assert!(row.volume_error < 0.45, "{}", row.volume_error);
     let [left, right] = [-0.1, 0.1].map(|x| run.velocity_at([x, 0.4]));
     assert!((left[1] - right[1]).abs() < 1e-3 * left[1].abs(), "{left:?} {right:?}");
     assert!((left[0] + right[0]).abs() < 1e-3 * left[1].abs(), "{left:?} {right:?}");
@@ -100,4 +101,26 @@ fn a_level_in_a_closed_hopper_rests() {
         .into_iter()
         .fold(0.0, f64::max);
     assert!(fastest < 1e-6 * scale, "{fastest} {scale}");
+}
+
+#[test]
+fn the_forces_on_all_walls_are_the_loads() {
+    let names = ["hl", "hr", "floor", "stone", "right", "left", "bottom", "top"];
+    let gauges: String =
+        names.iter().map(|n| format!("[[gauges]]\nname = \"f_{n}\"\non = \"{n}\"\n")).collect();
+    let mut run = hopper(&format!(
+        "[boundaries.bottom]\nkind = \"no_slip\"\n[[walls]]\nname = \"floor\"\nfrom = [0, 0.25]\n\
+         to = [0.25, 0.25]\n[[blocks]]\nname = \"stone\"\nkind = \"free_slip\"\n\
+         shape.circle = {{ centre = [0.1, 0.9], radius = 0.17 }}\n{gauges}"
+    ));
+    run.step().unwrap();
+    let mass: f64 = {
+        let (p, unit) = (run.particles(), run.plan().units.length.powi(2));
+        let of = |k: usize| if p.material[k] == 0 { 1000.0 } else { 1.0 };
+        (0..p.len()).map(|k| of(k) * p.volume[k] * unit).sum()
+    };
+    let sum = run.row().forces.iter().fold([0.0; 2], |[x, y], f| [x + f.x, y + f.y]);
+    // The weight is that of the shares in the cells, which the volumes of particles approach.
+    assert!((sum[1] / (-10.0 * mass) - 1.0).abs() < 1e-3, "{sum:?} {mass}");
+    assert!(sum[0].abs() < 1e-6 * mass, "{sum:?}");
 }

@@ -3,12 +3,23 @@
 use super::values::{Result, point, positive, ranges};
 use crate::plan::{Mark, Tracers, Units};
 use crate::scene::{Scene, SceneError, Scope};
+use crate::space::mesh::Mesh;
 
 /// Largest number of points of all lines.
 const MOST_POINTS: f64 = 4e6;
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (b[0] - a[0]).hypot(b[1] - a[1])
+}
+
+/// The lines without their parts inside of solids of any shape.
+pub(super) fn outside(tracers: Tracers, mesh: &Mesh) -> Tracers {
+    let Some(parts) = mesh.parts() else { return tracers };
+    let pieces = |line: Vec<[f64; 2]>| -> Vec<Vec<[f64; 2]>> {
+        let pieces = line.split(|&p| parts.is_solid(p)).filter(|piece| piece.len() > 1);
+        pieces.map(<[_]>::to_vec).collect()
+    };
+    Tracers { lines: tracers.lines.into_iter().flat_map(pieces).collect(), ..tracers }
 }
 
 /// The passive lines, and the segments whose particles are marked.
