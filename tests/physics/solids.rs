@@ -70,8 +70,15 @@ fn a_hopper_loses_nothing_and_stays_symmetric() {
     };
     // The outline is straight in an eighth of a cell.
     assert!((volume(run.as_ref()) / FREE - 1.0).abs() < 1e-3, "{}", volume(run.as_ref()));
-    for _ in 0..60 {
+    for step in 0..60 {
         run.step().unwrap();
+        if step == 3 {
+            // Rounding errors grow, and decide later which of two particles is split.
+            let [left, right] = [-0.1, 0.1].map(|x| run.velocity_at([x, 0.4]));
+            let largest = left[1].abs();
+            assert!((left[1] - right[1]).abs() < 1e-6 * largest, "{left:?} {right:?}");
+            assert!((left[0] + right[0]).abs() < 1e-6 * largest, "{left:?} {right:?}");
+        }
         for &p in &run.particles().position {
             let [x, y] = run.plan().si(p);
             let wall = if y < 0.3 { 0.3 } else { 0.3 + (y - 0.3) * 0.7 / 0.9 };
@@ -82,9 +89,6 @@ fn a_hopper_loses_nothing_and_stays_symmetric() {
     assert!(row.gauges[0].volume > 0.1, "{}", row.gauges[0].volume);
     // With rectangular steps instead of slopes it is 0.3.
     assert!(row.volume_error < 0.45, "{}", row.volume_error);
-    let [left, right] = [-0.1, 0.1].map(|x| run.velocity_at([x, 0.4]));
-    assert!((left[1] - right[1]).abs() < 1e-3 * left[1].abs(), "{left:?} {right:?}");
-    assert!((left[0] + right[0]).abs() < 1e-3 * left[1].abs(), "{left:?} {right:?}");
 }
 
 #[test]

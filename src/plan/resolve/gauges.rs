@@ -31,6 +31,9 @@ impl SiGauge {
     }
 }
 
+/// Name of a gauge of a force, and what carries the force.
+pub(in crate::plan) type Wanted = (String, String);
+
 /// The gauges of a scene: those of flows, and those of forces with what carries them; `supports` are the
 /// names of all that may.
 pub(super) fn gauges(
@@ -38,7 +41,7 @@ pub(super) fn gauges(
     scope: &Scope,
     domain: [[f64; 2]; 2],
     supports: &[String],
-) -> Result<(Vec<SiGauge>, Vec<(String, String)>)> {
+) -> Result<(Vec<SiGauge>, Vec<Wanted>)> {
     let (mut flows, mut forces) = (Vec::new(), Vec::new());
     for (k, g) in scene.gauges.iter().enumerate() {
         let what = format!("gauge `{}`", g.name);

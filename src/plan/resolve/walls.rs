@@ -77,8 +77,8 @@ pub(in crate::plan) fn axis_segment(
         return Err(SceneError::at(
             &to[0],
             format!("{what} is slanted: from ({}, {}) to ({}, {})", a[0], a[1], b[0], b[1]),
-            "make both x or both y equal; a wall may also be slanted with a thickness, as in \
-             thickness = 0.05",
+            "walls and gauges follow mesh lines: make both x or both y equal, or give a wall a \
+             thickness, as in thickness = 0.05",
         ));
     }
     if dx <= tiny && dy <= tiny {
