@@ -24,7 +24,7 @@
 use super::cells::CellsMut;
 use super::last_flow::LastFlow;
 use super::local_laws::Evaluation;
-use super::points::{CutStiffness, IntegrationPoint};
+use super::points::{CutStiffness, INSIDE_SOLIDS, IntegrationPoint};
 use super::sides::Kinked;
 use super::softening::{self, Directions, SofteningPoint};
 use super::terms::slip::SlipFaces;
@@ -43,11 +43,6 @@ use crate::threads;
 
 /// Largest number of cells per task.
 const GRAIN: usize = 32;
-
-/// Part of the viscosities that cells with a solid of any shape in them have everywhere, inside of
-/// the solid too, so that their matrix is definite however little is left of them. Between 1e-8
-/// and 1e-4 the flow is the same to four digits.
-const INSIDE_SOLIDS: f64 = 1e-6;
 
 /// Integration points of all cells, and means that the solver needs.
 pub struct Quadrature {
