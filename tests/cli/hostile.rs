@@ -422,7 +422,9 @@ fn requests() {
             send(&bytes).expect("the server takes connections");
         });
     });
-    let answer = send(corpus[1].as_bytes()).expect("a connection");
+    // Among many silent connections the server may close one before its request arrives.
+    let answers = (0..5).map(|_| send(corpus[1].as_bytes()).expect("a connection"));
+    let answer = answers.into_iter().find(|answer| !answer.is_empty()).unwrap_or_default();
     assert!(answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
     drop(slow);
     assert!(child.try_wait().expect("known").is_none(), "the server has ended");
