@@ -10,6 +10,7 @@ use super::terms::viscous::{add_cut_stiffness, add_stiffness};
 use super::terms::{FaceTerm, Terms};
 use crate::composition::Content;
 use crate::space::constraints::Constraints;
+use crate::space::embedding::CellMap;
 use crate::space::incidence::Incidence;
 use crate::space::mesh::Mesh;
 use crate::space::shape::{CENTRE, NODES, SIDE_NODES};
@@ -76,6 +77,38 @@ pub struct Ingredients<'a, const D: usize> {
     pub terms: &'a Terms,
 }
 
+impl<'a, const D: usize> Ingredients<'a, D> {
+    /// Terms on faces, of the scene and of walls along which material slips.
+    fn terms_on_faces(&self) -> impl Iterator<Item = &'a dyn FaceTerm> + use<'a, D> {
+        self.terms.on_faces().chain([self.quadrature.slip() as &dyn FaceTerm])
+    }
+
+    /// Map from the unknowns of a cell to its velocities, if they differ.
+    fn map(&self, cell: usize) -> Option<&'a CellMap> {
+        self.constraints.embedding()?.of_cell(cell)
+    }
+
+    /// Adds the terms on the faces of a cell to the matrix of its velocities, in the blocks of
+    /// components on and below the diagonal.
+    fn add_faces(&self, cell: usize, k: &mut Matrix) {
+        for term in self.terms_on_faces() {
+            let faces = term.faces();
+            let first = faces.partition_point(|face| face.cell < cell);
+            let own = faces[first..].iter().take_while(|face| face.cell == cell);
+            for (index, face) in (first..).zip(own) {
+                let nodes = SIDE_NODES[face.side];
+                for (i, &a) in nodes.iter().enumerate() {
+                    for (j, &b) in nodes.iter().enumerate() {
+                        for [c, d] in [[0, 0], [1, 0], [1, 1]] {
+                            k[NODES * c + a][NODES * d + b] += term.entry(index, [i, j], [c, d]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 impl<const D: usize> CellMatrix<D> {
     const ZERO: Self = CellMatrix {
         centre: Centre { inverse: [[0.0; D]; D], coupling: [[[0.0; D]; D]; 8] },
@@ -116,8 +149,7 @@ impl<const D: usize> Matrices<D> {
             self.built_from.fill(Content::Unknown);
         }
         // Terms on faces are not part of the content: cells with such a term are always computed.
-        let terms = || from.terms.on_faces().chain([from.quadrature.slip() as &dyn FaceTerm]);
-        let faces = || terms().flat_map(|t| t.faces());
+        let faces = || from.terms_on_faces().flat_map(|t| t.faces());
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
@@ -132,8 +164,11 @@ impl<const D: usize> Matrices<D> {
         }
         threads::for_each(&mut self.fresh, GRAIN, |_, fresh| fresh.build(from));
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
-        for term in terms() {
+        for term in from.terms_on_faces() {
             for (index, face) in term.faces().iter().enumerate() {
+                if from.map(face.cell).is_some() {
+                    continue;
+                }
                 if let Ok(k) = self.fresh.binary_search_by_key(&face.cell, |f| f.cell) {
                     self.fresh[k].add_face(from, term, index);
                 }
@@ -153,7 +188,8 @@ impl<const D: usize> Matrices<D> {
 }
 
 impl<const D: usize> Fresh<D> {
-    /// Computes the matrix of the cell, without the terms on faces.
+    /// Computes the matrix of the cell, without the terms on faces unless it has a map: those act on
+    /// velocities, not on its unknowns.
     fn build(&mut self, from: Ingredients<D>) {
         let Ingredients { mesh, incidence, constraints, quadrature, terms } = from;
         let cell = self.cell;
@@ -211,8 +247,9 @@ impl<const D: usize> Fresh<D> {
                 *penalty = 0.0;
             }
         }
-        let map = constraints.embedding().and_then(|relations| relations.of_cell(cell));
+        let map = from.map(cell);
         if let Some(map) = map {
+            from.add_faces(cell, &mut k);
             // Where all velocities are given, no pressure can change their divergence.
             let free =
                 |a: usize| (0..2).any(|c| !constraints.is_fixed(incidence.nodes[cell][a], c));

@@ -303,8 +303,7 @@ impl<const D: usize> Stokes<D> {
             [free.map(|c| force[node][c] * du[node][c]).sum()]
         });
         let Some(relations) = relations else { return slope };
-        let on_solids = relations.nodes().zip(&work.residual.on_solids);
-        slope + on_solids.map(|(node, f)| f[0] * du[node][0] + f[1] * du[node][1]).sum::<f64>()
+        slope + work.residual.power_on_solids(relations, du)
     }
 
     /// Share of the correction to be applied, at most one, and whether laws and residual are those

@@ -8,6 +8,7 @@ use super::report::Stopping;
 use super::terms::Terms;
 use crate::simd::Simd;
 use crate::space::constraints::Constraints;
+use crate::space::embedding::Embedding;
 use crate::space::incidence::Incidence;
 use crate::space::mesh::Mesh;
 use crate::space::shape::NODES;
@@ -132,6 +133,14 @@ pub(super) struct Residual<const D: usize> {
     pub(super) continued: f64,
     /// Largest mean viscosity of a cell.
     pub(super) stiffest: f64,
+}
+
+impl<const D: usize> Residual<D> {
+    /// Power of the residual at the nodes with relations with the velocities `u`.
+    pub(super) fn power_on_solids(&self, relations: &Embedding, u: &[[f64; D]]) -> f64 {
+        let nodes = relations.nodes().zip(&self.on_solids);
+        nodes.map(|(node, f)| f[0] * u[node][0] + f[1] * u[node][1]).sum()
+    }
 }
 
 /// A change of velocity (and rotation) and pressure.

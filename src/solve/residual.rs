@@ -238,10 +238,6 @@ impl<const D: usize> Stokes<D> {
             [power]
         });
         let Some(relations) = relations else { return power + r.supplied };
-        let on_solids = relations.nodes().zip(&r.on_solids).map(|(node, force)| {
-            let u = flow.velocity[node];
-            force[0] * u[0] + force[1] * u[1]
-        });
-        power + r.supplied + r.continued - on_solids.sum::<f64>()
+        power + r.supplied + r.continued - r.power_on_solids(relations, &flow.velocity)
     }
 }
