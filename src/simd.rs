@@ -111,38 +111,38 @@ pub fn multiply_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
 /// Defines a function that runs a kernel compiled for the given instruction set. The kernel is an
 /// `#[inline(always)]` function whose constants are the length of its arrays and whether
 /// [`multiply_add`] rounds once: `fn kernel<const LENGTH: usize, const FMA: bool>(..)`, and a
-/// further constant if the function has one. Arithmetic in a kernel belongs in loops and in
+/// further constants if the function has any. Arithmetic in a kernel belongs in loops and in
 /// `#[inline(always)]` functions: a closure that is not inlined is compiled for the baseline
 /// instruction set, where [`multiply_add`] with one rounding is a slow function call.
 ///
 /// SAFETY of the calls: a [`Simd`] exists only if the processor has the features that the callee is
 /// compiled with; the callee itself is safe code.
 macro_rules! dispatch {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<const $n:ident: usize>)? ($($arg:ident: $type:ty),* $(,)?)
+    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$(const $n:ident: $kind:ty),+>)? ($($arg:ident: $type:ty),* $(,)?)
      $(-> $out:ty)? = $kernel:ident) => {
         $(#[$doc])*
-        $vis fn $name $(<const $n: usize>)? (simd: $crate::simd::Simd, $($arg: $type),*) $(-> $out)? {
+        $vis fn $name $(<$(const $n: $kind),+>)? (simd: $crate::simd::Simd, $($arg: $type),*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
-            fn avx512 $(<const $n: usize>)? ($($arg: $type),*) $(-> $out)? {
-                $kernel::<16, true $(, $n)?>($($arg),*)
+            fn avx512 $(<$(const $n: $kind),+>)? ($($arg: $type),*) $(-> $out)? {
+                $kernel::<16, true $($(, $n)+)?>($($arg),*)
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma")]
-            fn avx2 $(<const $n: usize>)? ($($arg: $type),*) $(-> $out)? {
-                $kernel::<8, true $(, $n)?>($($arg),*)
+            fn avx2 $(<$(const $n: $kind),+>)? ($($arg: $type),*) $(-> $out)? {
+                $kernel::<8, true $($(, $n)+)?>($($arg),*)
             }
             match simd.set() {
                 #[cfg(target_arch = "x86_64")]
                 #[allow(unsafe_code)]
-                $crate::simd::InstructionSet::Avx512 => unsafe { avx512 $(::<$n>)? ($($arg),*) },
+                $crate::simd::InstructionSet::Avx512 => unsafe { avx512 $(::<$($n),+>)? ($($arg),*) },
                 #[cfg(target_arch = "x86_64")]
                 #[allow(unsafe_code)]
-                $crate::simd::InstructionSet::Avx2 => unsafe { avx2 $(::<$n>)? ($($arg),*) },
+                $crate::simd::InstructionSet::Avx2 => unsafe { avx2 $(::<$($n),+>)? ($($arg),*) },
                 $crate::simd::InstructionSet::Portable => {
                     const FMA: bool =
                         cfg!(any(target_arch = "aarch64", target_feature = "fma"));
-                    $kernel::<8, FMA $(, $n)?>($($arg),*)
+                    $kernel::<8, FMA $($(, $n)+)?>($($arg),*)
                 }
             }
         }

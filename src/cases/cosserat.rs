@@ -17,7 +17,7 @@ pub struct Fluid {
 
 impl Fluid {
     /// `k^2 = 4 eta eta_c / (M (eta + eta_c))`, the inverse thickness of boundary layers.
-    fn k(&self) -> f64 {
+    pub(super) fn k(&self) -> f64 {
         let m = 2.0 * self.coupling * self.internal_length.powi(2);
         (4.0 * self.shear * self.coupling / (m * (self.shear + self.coupling))).sqrt()
     }

@@ -1,6 +1,7 @@
 //! This module holds cases with exact solutions. A case combines a scene, its exact fields and the
 //! expected orders of convergence. Tests and commands measure all cases with the same functions.
 
+pub mod axisymmetric;
 mod bending;
 mod cosserat;
 mod flow_curves;

@@ -14,6 +14,15 @@
 //! of a fluid at rest (rounding) doubled with every step. In cells nearly full of the stiff fluid,
 //! `b` keeps the shifts nearly equal: there the slip of the thin fluid has little effect, and a
 //! shift of the stiff fluid would affect all.
+//!
+//! Around an axis volumes are those of rings and centroids are weighted by them, so that of the cell has
+//! `xi = t/3` with its tilt `t` ([`measure`](crate::space::measure)). The linear share
+//!
+//! ```text
+//! chi_m = s_m [1 + 3 (X_m - t/3)(xi - t/3)/(1 - t^2/3) + 3 Y_m eta]
+//! ```
+//! has the volume and the centroid of the particles; its area and centroid in the plane of the mesh are
+//! those that lines are found from.
 
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
@@ -22,6 +31,8 @@ use crate::space::particles::Particles;
 #[derive(Default)]
 pub struct Centroids {
     parts: Vec<Part>,
+    /// Tilt of the cell.
+    tilt: f64,
 }
 
 /// One material in the cell.
@@ -36,7 +47,7 @@ struct Part {
 impl Centroids {
     /// Centroids of a number of materials, without particles.
     pub fn new(materials: usize) -> Self {
-        Centroids { parts: vec![Part::default(); materials] }
+        Centroids { parts: vec![Part::default(); materials], tilt: 0.0 }
     }
 
     /// Allocates memory for a number of materials.
@@ -47,6 +58,7 @@ impl Centroids {
     /// Sums the volumes and moments of the particles of a cell.
     pub fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles) {
         self.parts.fill(Part::default());
+        self.tilt = mesh.whole_measure(cell).tilt();
         for p in particles.of_cell(cell) {
             let (volume, part) =
                 (particles.volume[p], &mut self.parts[particles.material[p] as usize]);
@@ -77,6 +89,7 @@ impl Centroids {
                 offset[c] += share * part.moment[c];
             }
         }
+        offset[0] -= self.tilt / 3.0;
         for ((part, factor), viscosity) in self.parts.iter_mut().zip(factors).zip(viscosity) {
             if part.volume == 0.0 {
                 continue;
@@ -97,5 +110,30 @@ impl Centroids {
     /// Shifted centroid of a material of the cell, after [`Centroids::finish`].
     pub fn centroid(&self, m: usize) -> [f64; 2] {
         self.parts[m].moment
+    }
+
+    /// Slopes of the linear share of a material, relative to its share.
+    fn slopes(&self, m: usize) -> [f64; 2] {
+        let [x, y] = self.parts[m].moment;
+        [3.0 * (x - self.tilt / 3.0) / self.lack(), 3.0 * y]
+    }
+
+    /// Three times the mean square of `xi - t/3`.
+    fn lack(&self) -> f64 {
+        1.0 - self.tilt * self.tilt / 3.0
+    }
+
+    /// Linear share of a material at reference coordinates, after [`Centroids::finish`].
+    pub fn share_at(&self, m: usize, r: [f64; 2]) -> f64 {
+        let [x, y] = self.slopes(m);
+        self.share(m) * (1.0 + x * (r[0] - self.tilt / 3.0) + y * r[1])
+    }
+
+    /// Share and centroid of a material in the plane of the mesh, after [`Centroids::finish`].
+    pub fn in_section(&self, m: usize) -> (f64, [f64; 2]) {
+        let [x, y] = self.parts[m].moment;
+        let x = (x - self.tilt / 3.0) / self.lack();
+        let area = 1.0 - x * self.tilt;
+        (self.share(m) * area, [x / area, y / area])
     }
 }

@@ -39,6 +39,8 @@ pub struct Gathered {
     /// Orientation of all directors of the cell, by material.
     cell_orientation: Vec<Orientation>,
     centroids: Centroids,
+    /// Weights of the Gauss points, which add up to one.
+    points: [f64; 9],
     /// Particles of the cell and its neighbours.
     surroundings: Surroundings,
     /// Working memory.
@@ -93,6 +95,8 @@ impl Gathered {
 
     /// Computes the sums over the particles of a cell.
     pub fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, kinds: &[Kind]) {
+        let measure = mesh.whole_measure(cell);
+        self.points = GAUSS_3X3.each_ref().map(|g| measure.share(g.weight, g.r[0]));
         self.weight.fill(0.0);
         self.orientation.fill(Orientation::default());
         self.volume.fill(0.0);
@@ -174,8 +178,7 @@ impl Gathered {
             for m in 0..materials {
                 let share = wanted(&self.volume, m) / volume;
                 let weight = &mut self.weight[9 * m..9 * m + 9];
-                let mean: f64 =
-                    weight.iter().zip(GAUSS_3X3.iter()).map(|(w, g)| w * g.weight).sum();
+                let mean: f64 = weight.iter().zip(self.points).map(|(w, g)| w * g).sum();
                 if share > 0.0 && mean > 0.0 {
                     weight.iter_mut().for_each(|w| *w *= share / mean);
                     worst = worst.max((share - mean).abs());
@@ -216,7 +219,7 @@ impl Gathered {
 
     /// Share of a material in the cell, after [`Gathered::match_volumes`].
     pub fn mean_share(&self, material: usize) -> f64 {
-        GAUSS_3X3.iter().enumerate().map(|(g, point)| point.weight * self.share(material, g)).sum()
+        self.points.iter().enumerate().map(|(g, point)| point * self.share(material, g)).sum()
     }
 
     /// Volumes of the materials.

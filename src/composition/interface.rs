@@ -20,6 +20,7 @@
 //! edges.
 
 use super::features::{Labelled, Strip};
+use crate::space::measure::CellMeasure;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_6X6, SUBPOINTS};
@@ -101,7 +102,7 @@ fn value(f: &[f64; 6], x: &[f64; 6]) -> f64 {
 #[derive(Default)]
 pub struct Surroundings {
     particles: Vec<Labelled>,
-    size: [f64; 2],
+    cell: CellMeasure,
 }
 
 impl Surroundings {
@@ -114,13 +115,13 @@ impl Surroundings {
     /// if the regression fails.
     pub fn interface(&self, wanted: f64) -> Option<Interface> {
         let f = self.regress()?;
-        Some(describe(&f, self.size, wanted))
+        Some(describe(&f, self.cell, wanted))
     }
 
     /// Collects the particles of two materials in a cell and around it.
     pub fn gather(&mut self, mesh: &Mesh, particles: &Particles, cell: usize, between: [usize; 2]) {
         let [a, b] = between;
-        self.size = mesh.cell_size(cell);
+        self.cell = mesh.whole_measure(cell);
         self.particles.clear();
         let [cx, cy] = mesh.cell_centre(cell);
         let [hx, hy] = mesh.cell_size(cell);
@@ -181,7 +182,8 @@ pub(super) fn fade(x: f64, [a, b]: [f64; 2]) -> f64 {
 }
 
 /// The interface of a level set in a cell.
-fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
+fn describe(f: &Coefficients, cell: CellMeasure, wanted: f64) -> Interface {
+    let [hx, hy] = cell.size;
     let mut share = [0.0; SUBPOINTS];
     let mut held = 0.0;
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
@@ -192,7 +194,7 @@ fn describe(f: &Coefficients, [hx, hy]: [f64; 2], wanted: f64) -> Interface {
         let slope = (gx * gx + gy * gy).sqrt().max(1e-30);
         let distance = value(f, &basis(at)) / slope;
         *share = (0.5 + distance / RAMP).clamp(0.0, 1.0);
-        held += g.weight * *share;
+        held += cell.share(g.weight, g.r[0]) * *share;
         // Directions are physical, not those of the stretched reference cell.
         let (nx, ny) = (gx / hx, gy / hy);
         let nearness = (-(distance / NEAR).powi(2)).exp() / (nx * nx + ny * ny).max(1e-60);

@@ -14,7 +14,8 @@
 //! g^2 = d.d + tr(D)^2 + 4 a (o - w)^2 + 2 a R^2 |grad w|^2,   a = eta_c/eta
 //! ```
 //! with `2 a (R_l^2 - R^2) (t.grad w)^2` in addition if the layers, along `t`, have an internal length
-//! `R_l` of their own, and the power per volume is `eta g^2`. With `tau' > 0` the stress is the
+//! `R_l` of their own, and in axisymmetric flow the power of the hoop rates (see [`point`](super::point)).
+//! The power per volume is `eta g^2`. With `tau' > 0` the stress is the
 //! gradient of a convex function of the rates, so at fixed pressure a flow is the minimum of a convex
 //! functional, and the derivative of the stress is positive definite:
 //!

@@ -18,6 +18,8 @@ fn shifted(s: &Sym2, f: f64) -> Sym2 {
 /// - Couple viscosity: arithmetic mean, `M = sum phi_m M_m`, likewise the matrix of the bending of
 ///   layers, so that the natural (moment-free)
 ///   boundary condition at the edge of a Cosserat material is that of its own share of the cell.
+/// - Viscosity of the hoop deviator: arithmetic mean. The hoop rate lies along every interface, so all
+///   materials have the same one.
 ///
 /// With an unweighted mean of `eta_c`, a drop of Cosserat fluid in a fluid a thousand times thinner
 /// fell 10 % too slowly at 16 cells; with this mean the error is 2 %. A harmonic mean is better in
@@ -40,6 +42,7 @@ pub struct Mixture {
     coupling: f64,
     couple: f64,
     bending: Sym2,
+    hoop: f64,
 }
 
 impl Mixture {
@@ -61,6 +64,7 @@ impl Mixture {
     /// Adds a material with the volume fraction `phi`.
     pub fn add(&mut self, phi: f64, law: &PointLaw) {
         self.couple += phi * law.couple;
+        self.hoop += phi * law.hoop;
         self.bending.add_scaled(phi, &law.bending);
         if self.parallel {
             self.shear.add_scaled(phi, &law.shear);
@@ -83,8 +87,8 @@ impl Mixture {
         if self.parallel {
             let (shear, dilation) = (self.shear, self.dilation_share);
             let coupling = self.coupling / self.fluidity;
-            let (couple, bending) = (self.couple, self.bending);
-            return PointLaw { shear, dilation, coupling, couple, bending };
+            let (couple, bending, hoop) = (self.couple, self.bending, self.hoop);
+            return PointLaw { shear, dilation, coupling, couple, bending, hoop };
         }
         let shear = shifted(&self.shear.inverse(), -self.around);
         PointLaw {
@@ -98,6 +102,7 @@ impl Mixture {
             coupling: self.coupling * shear.mean(),
             couple: self.couple,
             bending: self.bending,
+            hoop: self.hoop,
         }
     }
 }

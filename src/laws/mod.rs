@@ -199,6 +199,6 @@ impl Law {
         let Cosserat { coupling, couple, .. } = rotation;
         let bending = layered::bending(rotation.bending(), orientation);
         let dilation = if self.compliance == 0.0 { viscosity } else { 0.0 };
-        PointLaw { shear, dilation, coupling, couple, bending }
+        PointLaw { shear, dilation, coupling, couple, bending, hoop: 3.0 * viscosity }
     }
 }

@@ -9,6 +9,15 @@
 //! plus `-p div u`. An isotropic fluid has `S = eta I` and `N = 0`. With `beta = eta` the first two terms are
 //! `2 eta D:D`, the form used for incompressible materials. A material with a finite bulk viscosity
 //! has `beta = 0`; its bulk viscosity enters through the pressure.
+//!
+//! Around an axis the power has besides
+//!
+//! ```text
+//! c (D_tt - tr(D)/3)^2 + (M + tr N) (w/x)^2,   c = 3 eta
+//! ```
+//! With these the power of an isotropic fluid is `2 eta D':D' + beta tr(D)^2` with the deviator in three
+//! dimensions. The hoop direction lies in the layers of a layered material: `eta` is the viscosity of
+//! stretching.
 
 use super::rates::{Rates, Stress};
 
@@ -75,6 +84,8 @@ pub struct PointLaw {
     /// Couple viscosity matrix N of the bending of layers, Pa s m2; see
     /// [`layered`](super::layered). `M I + N` is positive semi-definite.
     pub bending: Sym2,
+    /// Viscosity c of the hoop deviator, Pa s; of no effect in the plane.
+    pub hoop: f64,
 }
 
 impl PointLaw {
@@ -83,7 +94,7 @@ impl PointLaw {
     pub fn with_viscosity_scaled(&self, f: f64) -> Self {
         let mut shear = Sym2::default();
         shear.add_scaled(f, &self.shear);
-        PointLaw { shear, dilation: f * self.dilation, ..*self }
+        PointLaw { shear, dilation: f * self.dilation, hoop: f * self.hoop, ..*self }
     }
 
     /// The law with all its viscosities multiplied by `f`.
@@ -124,12 +135,32 @@ impl PointLaw {
             mean: volume * self.dilation * r.trace,
             skew: volume * 4.0 * self.coupling * r.relative_spin,
             couple: [0, 1].map(|c| volume * self.couple * r.kappa[c] + volume * bending[c]),
+            hoop: volume * self.hoop * r.hoop,
+            hoop_couple: volume * self.hoop_couple() * r.hoop_kappa,
         }
+    }
+
+    /// Couple viscosity of the hoop curvature, Pa s m2.
+    #[inline(always)]
+    fn hoop_couple(&self) -> f64 {
+        self.couple + self.bending.a + self.bending.b
     }
 
     /// Power per volume at the rates `r`, without the power of the pressure.
     #[inline(always)]
     pub fn power(&self, r: &Rates) -> f64 {
+        self.power_in_plane(r) + self.power_around_axis(r)
+    }
+
+    /// Part of the power of the hoop deviator and the hoop curvature.
+    #[inline(always)]
+    pub fn power_around_axis(&self, r: &Rates) -> f64 {
+        self.hoop * r.hoop * r.hoop + self.hoop_couple() * r.hoop_kappa * r.hoop_kappa
+    }
+
+    /// Part of the power of all other rates.
+    #[inline(always)]
+    pub fn power_in_plane(&self, r: &Rates) -> f64 {
         self.shear.quadratic(r.d)
             + self.dilation * r.trace * r.trace
             + 4.0 * self.coupling * r.relative_spin * r.relative_spin

@@ -8,6 +8,14 @@
 //! The laws use these combinations: the deviatoric rates
 //! `d = (D_xx - D_yy, 2 D_xy)`, the trace, the relative spin `o - w` with `o = (v,x - u,y)/2`, and
 //! the curvature rates `kappa`. Units: 1/s, and 1/(m s) for `kappa`.
+//!
+//! Where x is the radius of an axisymmetric flow, there are besides the hoop rate `D_tt = u/x`, which
+//! is part of the trace, and the hoop curvature `w/x`. The laws use the hoop deviator `D_tt - tr(D)/3`;
+//! in the plane both are zero. With them,
+//!
+//! ```text
+//! D':D' = d.d/2 + (3/2) (D_tt - tr(D)/3)^2,   D' = D - tr(D)/3 I
+//! ```
 
 /// Deformation rates at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,6 +28,10 @@ pub struct Rates {
     pub relative_spin: f64,
     /// Curvature rates `grad w`, 1/(m s).
     pub kappa: [f64; 2],
+    /// Hoop deviator `D_tt - tr(D)/3`, 1/s; zero in the plane.
+    pub hoop: f64,
+    /// Hoop curvature `w/x`, 1/(m s); zero in the plane.
+    pub hoop_kappa: f64,
 }
 
 impl Stress {
@@ -31,6 +43,18 @@ impl Stress {
             + self.skew * r.relative_spin
             + self.couple[0] * r.kappa[0]
             + self.couple[1] * r.kappa[1]
+            + self.hoop * r.hoop
+            + self.hoop_couple * r.hoop_kappa
+    }
+
+    /// The stresses `[[sigma_xx, sigma_xy], [sigma_yx, sigma_yy]]` and the hoop stress, conjugate to the
+    /// velocity gradient `u_j,i` and to `u/x`.
+    #[inline(always)]
+    pub fn components(&self) -> ([[f64; 2]; 2], f64) {
+        let [d0, d1] = self.deviator;
+        let mean = self.mean - self.hoop / 3.0;
+        let half = 0.5 * self.skew;
+        ([[mean + d0, d1 - half], [d1 + half, mean - d0]], self.mean + self.hoop / 1.5)
     }
 }
 
@@ -38,7 +62,7 @@ impl Rates {
     /// Rates of a classical continuum, from the velocity gradient `[[u,x, u,y], [v,x, v,y]]`.
     #[inline(always)]
     pub fn classical([[ux, uy], [vx, vy]]: [[f64; 2]; 2]) -> Self {
-        Rates { d: [ux - vy, uy + vx], trace: ux + vy, relative_spin: 0.0, kappa: [0.0; 2] }
+        Rates { d: [ux - vy, uy + vx], trace: ux + vy, ..Rates::default() }
     }
 
     /// Rates of a Cosserat continuum with the rotation rate `w` and its gradient `kappa`.
@@ -46,6 +70,19 @@ impl Rates {
     pub fn cosserat(gradient: [[f64; 2]; 2], w: f64, kappa: [f64; 2]) -> Self {
         let [[_, uy], [vx, _]] = gradient;
         Rates { relative_spin: 0.5 * (vx - uy) - w, kappa, ..Rates::classical(gradient) }
+    }
+
+    /// The rates of a flow around the axis, with the hoop rate `u/x` and the hoop curvature `w/x` in
+    /// addition.
+    #[inline(always)]
+    pub fn around_axis(self, hoop: f64, hoop_kappa: f64) -> Self {
+        let trace = self.trace + hoop;
+        Rates { trace, hoop: hoop - trace / 3.0, hoop_kappa, ..self }
+    }
+
+    /// Hoop rate `u/x`, 1/s, of a flow around the axis.
+    pub fn hoop_rate(&self) -> f64 {
+        self.hoop + self.trace / 3.0
     }
 
     /// Adds `f` times other rates.
@@ -56,12 +93,15 @@ impl Rates {
         }
         self.trace += f * o.trace;
         self.relative_spin += f * o.relative_spin;
+        self.hoop += f * o.hoop;
+        self.hoop_kappa += f * o.hoop_kappa;
     }
 
-    /// Square of the strain rate, `D:D`, 1/s2.
+    /// Square of the strain rate, 1/s2: `D:D` in the plane; around an axis `D:D + tr(D)^2/6`.
     #[inline(always)]
     pub fn strain_squared(&self) -> f64 {
         0.5 * (self.d[0] * self.d[0] + self.d[1] * self.d[1] + self.trace * self.trace)
+            + 1.5 * self.hoop * self.hoop
     }
 }
 
@@ -71,10 +111,15 @@ impl Rates {
 pub struct Stress {
     /// Deviatoric stresses `(sigma_xx - sigma_yy)/2` and `(sigma_xy + sigma_yx)/2`.
     pub deviator: [f64; 2],
-    /// Viscous part of the mean stress `(sigma_xx + sigma_yy)/2`.
+    /// Viscous part of the mean stress: `(sigma_xx + sigma_yy)/2` in the plane, a third of the trace
+    /// around an axis.
     pub mean: f64,
     /// Skew part `sigma_yx - sigma_xy`.
     pub skew: f64,
     /// Couple stresses `mu_x` and `mu_y`.
     pub couple: [f64; 2],
+    /// Hoop stress less the mean of the stresses in the plane; zero in the plane.
+    pub hoop: f64,
+    /// Couple stress conjugate to the hoop curvature; zero in the plane.
+    pub hoop_couple: f64,
 }

@@ -115,7 +115,8 @@ pub fn advance(
                 }
                 if let Some(stretch) = members.stretch.get_mut(at) {
                     let follows = compliant(particles.material[p]);
-                    *stretch = if follows { (l.trace() * frozen_flow.dt).exp() } else { 1.0 };
+                    let rate = || frozen_flow.dilation(displacement.middle, &l);
+                    *stretch = if follows { (rate() * frozen_flow.dt).exp() } else { 1.0 };
                 }
             });
         }

@@ -98,6 +98,12 @@ pub struct Ways {
     pub inside: [bool; TOGETHER],
 }
 
+/// Velocity of a cell at several points.
+pub(super) trait AtPoints {
+    /// Velocity at reference coordinates.
+    fn at_points<const FMA: bool>(&self, r: &Points) -> Points;
+}
+
 dispatch! {
     /// Traces points at the reference coordinates `r` with the classical Runge-Kutta method.
     /// `step`: change of the reference coordinates by a unit velocity during the step.
@@ -110,12 +116,18 @@ fn ways_kernel<const LENGTH: usize, const FMA: bool>(
     r: &Points,
     step: [f64; 2],
 ) -> Ways {
+    ways::<FMA, _>(current, r, step)
+}
+
+/// Paths of points, see [`trace_points`].
+#[inline(always)]
+pub(super) fn ways<const FMA: bool, V: AtPoints>(current: &V, r: &Points, step: [f64; 2]) -> Ways {
     let mut inside = [true; TOGETHER];
-    let k1 = current.at_all::<FMA>(r);
-    let k2 = current.at_all::<FMA>(&stage::<FMA>(r, &k1, step, 0.5, &mut inside));
+    let k1 = current.at_points::<FMA>(r);
+    let k2 = current.at_points::<FMA>(&stage::<FMA>(r, &k1, step, 0.5, &mut inside));
     let middle = stage::<FMA>(r, &k2, step, 0.5, &mut inside);
-    let k3 = current.at_all::<FMA>(&middle);
-    let k4 = current.at_all::<FMA>(&stage::<FMA>(r, &k3, step, 1.0, &mut inside));
+    let k3 = current.at_points::<FMA>(&middle);
+    let k4 = current.at_points::<FMA>(&stage::<FMA>(r, &k3, step, 1.0, &mut inside));
     let mut velocity = [[0.0; TOGETHER]; 2];
     for c in 0..2 {
         for p in 0..TOGETHER {
@@ -149,9 +161,9 @@ fn stage<const FMA: bool>(
     at
 }
 
-impl CellVelocity {
+impl AtPoints for CellVelocity {
     #[inline(always)]
-    fn at_all<const FMA: bool>(&self, r: &Points) -> Points {
+    fn at_points<const FMA: bool>(&self, r: &Points) -> Points {
         [values::<FMA>(&self.u, &r[0], &r[1]), values::<FMA>(&self.v, &r[1], &r[0])]
     }
 }

@@ -1,7 +1,9 @@
 //! This module advects points through the velocity at the middle of the step, which is second order
 //! in time.
 
-use super::cell_velocity::{CellVelocity, Points, TOGETHER, trace_points};
+use super::cell_velocity::{Points, TOGETHER};
+pub use super::currents::CELL_GRAIN;
+use super::currents::Currents;
 use crate::laws::director;
 use crate::simd::Simd;
 use crate::space::kink::Kink;
@@ -12,12 +14,9 @@ use crate::space::walls::{Enclosure, Landing};
 use crate::threads;
 use nalgebra::Matrix2;
 
-/// Number of cells in a parallel task.
-pub const CELL_GRAIN: usize = 64;
-
 /// Corrected velocity of every cell. The buffer is reused in the next step.
 pub struct CellVelocities {
-    cells: Vec<CellVelocity>,
+    cells: Currents,
     /// Part of the velocity of each cell that has a kink; empty if no velocity of the run has one.
     edges: Vec<Option<Edge>>,
     /// Velocity of each cell with a solid of any shape in it; empty without solids.
@@ -33,7 +32,7 @@ impl CellVelocities {
         let free = (0..mesh.cells()).map(|cell| is_free(mesh, enclosure, cell)).collect();
         let edges = if kinked { vec![None; mesh.cells()] } else { Vec::new() };
         let streams = vec![None; if mesh.parts().is_some() { mesh.cells() } else { 0 }];
-        CellVelocities { cells: vec![CellVelocity::default(); mesh.cells()], edges, streams, free }
+        CellVelocities { cells: Currents::new(mesh), edges, streams, free }
     }
 }
 
@@ -74,7 +73,7 @@ pub struct FrozenFlow<'a> {
     /// Length of the step, in the plan's units.
     pub dt: f64,
     /// Velocity of every cell at the middle of the step.
-    velocities: &'a [CellVelocity],
+    velocities: &'a Currents,
     edges: &'a [Option<Edge>],
     streams: &'a [Option<StreamFlow>],
     free: &'a [bool],
@@ -162,20 +161,18 @@ impl<'a> FrozenFlow<'a> {
         });
         threads::for_each(streams, CELL_GRAIN, |cell, stream| {
             let of = mesh.part(cell).and_then(|part| part.stream.as_ref());
-            *stream = of.map(|s| s.flow(&of_nodes(cell)));
+            // Fluxes around an axis have a streamfunction.
+            let flux = |n: usize| velocity[n].map(|u| u * mesh.thickness(mesh.node_position(n)));
+            *stream = of.map(|s| s.flow(&mesh.cell_nodes(cell).map(flux)));
         });
-        threads::for_each(cells, CELL_GRAIN, |cell, current| {
+        cells.update(mesh, |cell| {
             let mut nodal = of_nodes(cell);
             if let Some(Some(Edge { kink, jump })) = edges.get(cell) {
                 for (u, psi) in nodal.iter_mut().zip(kink.biquadratic()) {
                     *u = [u[0] + psi * jump[0], u[1] + psi * jump[1]];
                 }
             }
-            *current = match mesh.part(cell) {
-                None => CellVelocity::new(&nodal, mesh.cell_size(cell)),
-                // It vanishes on the outline of the solid; corrected, it would not.
-                Some(_) => CellVelocity::uncorrected(&nodal),
-            };
+            nodal
         });
         let simd = Simd::used();
         FrozenFlow { mesh, enclosure, dt, velocities: cells, edges, streams, free, simd }
@@ -191,7 +188,7 @@ impl<'a> FrozenFlow<'a> {
         if let Some(u) = self.beside_solid(cell, r) {
             return u;
         }
-        let u = self.velocities[cell].at(r);
+        let u = self.velocities.at(cell, r);
         let Some(Edge { kink, jump }) = self.edge(cell) else { return u };
         let psi = kink.edge(r);
         [u[0] + psi * jump[0], u[1] + psi * jump[1]]
@@ -203,7 +200,8 @@ impl<'a> FrozenFlow<'a> {
         let p = self.mesh.from_reference(cell, r);
         let (solid, d) = self.mesh.parts()?.nearest(p)?;
         let stream = self.mesh.part(cell)?.stream.as_ref()?;
-        Some(stream.velocity(flow, p, d, solid.outline.normal(p)))
+        let flux = stream.velocity(flow, p, d, solid.outline.normal(p));
+        Some(flux.map(|f| f / self.mesh.thickness(p)))
     }
 
     /// The start cell with an index.
@@ -291,7 +289,7 @@ impl<'a> FrozenFlow<'a> {
                 [r[0][k], r[1][k]] = home.reference(*p);
             }
             let step = home.spans.map(|[_, own, _]| dt * own.per_length);
-            let ways = trace_points(self.simd, &self.velocities[cell], &r, step);
+            let ways = self.velocities.trace(self.simd, cell, &r, step);
             for (k, &p) in points.iter().enumerate() {
                 let displacement = if ways.inside[k] {
                     let to = [0, 1].map(|c| p[c] + dt * ways.velocity[c][k]);
@@ -308,7 +306,7 @@ impl<'a> FrozenFlow<'a> {
     /// Velocity gradient at a cell and reference coordinates, such as the middle of a displacement.
     pub fn gradient(&self, (cell, r): (usize, [f64; 2])) -> Matrix2<f64> {
         let size = self.mesh.cell_size(cell);
-        let mut gradient = self.velocities[cell].gradient(r, size);
+        let mut gradient = self.velocities.gradient(cell, r, size);
         if let Some(Edge { kink, jump }) = self.edge(cell) {
             let slopes = kink.slopes_of_edge(r);
             for i in 0..2 {
@@ -318,6 +316,16 @@ impl<'a> FrozenFlow<'a> {
             }
         }
         gradient
+    }
+
+    /// Rate `div u` at which the volume of a point grows.
+    pub fn dilation(&self, at: (usize, [f64; 2]), gradient: &Matrix2<f64>) -> f64 {
+        let per_radius = self.mesh.whole_measure(at.0).per_radius(at.1[0]);
+        let mut rate = gradient.trace();
+        if per_radius != 0.0 {
+            rate += per_radius * self.velocity(at.0, at.1)[0];
+        }
+        rate
     }
 
     /// The director `n` after the step under the velocity gradient `l`.

@@ -96,6 +96,7 @@ impl Counter {
         for k in first..last {
             let Some(owner) = cell(above, k).or(cell(below, k)) else { continue };
             let edge = if above.is_some() { -1.0 } else { 1.0 };
+            let face = mesh.face(owner, 2 * normal + usize::from(above.is_none()));
             let nodal = flow.of_cell(mesh, owner);
             let around = k.saturating_sub(1).max(first)..(k + 2).min(last);
             for s in 0..SAMPLES {
@@ -112,7 +113,7 @@ impl Counter {
                     mean.add(particles, near);
                 }
                 let share = mean.value().unwrap_or(f64::from(background == Some(g.material)));
-                flux += g.sign * share * u * mesh.face_area(owner, normal) / SAMPLES as f64;
+                flux += g.sign * share * u * face.of_point(1.0, t) / SAMPLES as f64;
             }
         }
         flux

@@ -137,8 +137,10 @@ impl Inflow {
         let outwards = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
         let nodes = mesh.cell_nodes(home);
         let nodal = SIDE_NODES[side].map(|a| velocity[nodes[a]]);
+        let area = mesh.face(home, side);
         let at = |t: f64, c: usize| -> f64 {
-            Shape::line(t).into_iter().zip(nodal).map(|(n, u)| n * u[c]).sum()
+            let u: f64 = Shape::line(t).into_iter().zip(nodal).map(|(n, u)| n * u[c]).sum();
+            u * area.thickness(t)
         };
         let width = 2.0 / self.particles_along as f64;
         let low = -1.0 + k as f64 * width;
@@ -161,7 +163,7 @@ impl Inflow {
             return;
         }
         let size = mesh.cell_size(home);
-        let volume = dt * speed * mesh.face_area(home, normal) / self.particles_along as f64;
+        let volume = dt * speed * area.area / self.particles_along as f64;
         // Where cells are made smaller by grading, a step crosses several of them.
         let depth = dt * speed / size[normal];
         let drift = 2.0 * dt * mean(1 - normal) / size[1 - normal];
@@ -172,7 +174,7 @@ impl Inflow {
         };
         let material = self.entering[entering].material;
         let carried = self.carried(plan, &self.entering[entering], point(0.0, middle));
-        let parts = (volume / self.usual(mesh, home)).ceil().max(1.0);
+        let parts = (volume / self.usual(mesh, home, point(0.0, middle))).ceil().max(1.0);
         for part in 0..parts as usize {
             let share = (part as f64 + 0.5) / parts;
             let along = (middle + share * drift).clamp(-INSIDE, INSIDE);
@@ -204,16 +206,17 @@ impl Inflow {
         ([angle.cos(), angle.sin()], values)
     }
 
-    /// Volume of a usual particle in a cell.
-    fn usual(&self, mesh: &Mesh, cell: usize) -> f64 {
-        mesh.cell_volume(cell) / self.particles_along.pow(2) as f64
+    /// Volume of a usual particle at a point of a cell.
+    fn usual(&self, mesh: &Mesh, cell: usize, at: [f64; 2]) -> f64 {
+        let (measure, [xi, _]) = (mesh.cell_measure(cell), mesh.to_reference(cell, at));
+        measure.share(measure.volume(), xi) / self.particles_along.pow(2) as f64
     }
 
     /// Adds an entry to the nearest particle of its material in its cell that is not larger than
     /// usual afterwards, or else as a new particle.
     fn add(&self, mesh: &Mesh, particles: &mut Particles, entry: &Entry) {
         let &Entry { cell, material, volume, at, carried: (director, values), .. } = entry;
-        let usual = self.usual(mesh, cell);
+        let usual = self.usual(mesh, cell, at);
         let [hx, hy] = mesh.cell_size(cell);
         let distance = |p: usize| {
             let d = particles.position[p];

@@ -2,7 +2,9 @@
 
 pub mod advect;
 pub mod cell_velocity;
+mod currents;
 pub mod frozen_flow;
 pub mod gauges;
 pub mod inflow;
+mod ring_velocity;
 pub mod tracers;

@@ -229,7 +229,7 @@ impl BoundaryPlan {
     /// Net outflow due to the prescribed normal velocities of the sides, and the integral of their
     /// magnitudes.
     pub fn net_outflow<const D: usize>(&self, mesh: &Mesh, given: &Constraints<D>) -> (f64, f64) {
-        const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
+        const SIMPSON: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 4.0 / 6.0), (1.0, 1.0 / 6.0)];
         let (mut net, mut total) = (0.0, 0.0);
         for (s, piece) in self.pieces() {
             let normal = side_normal(s);
@@ -237,13 +237,12 @@ impl BoundaryPlan {
                 continue;
             }
             let sign = if s % 2 == 0 { -1.0 } else { 1.0 };
-            let (_, axis) = mesh.axes(normal);
-            for (k, cell) in piece.segment.cells_at_side(mesh, s) {
-                let nodes = mesh.cell_nodes(cell);
-                for (a, weight) in SIDE_NODES[s].into_iter().zip(SIMPSON) {
+            for (_, cell) in piece.segment.cells_at_side(mesh, s) {
+                let (nodes, face) = (mesh.cell_nodes(cell), mesh.face(cell, s));
+                for (a, (t, weight)) in SIDE_NODES[s].into_iter().zip(SIMPSON) {
                     let v = given.fixed_value(nodes[a], normal).unwrap_or(0.0);
-                    net += sign * weight * axis.size(k) * v;
-                    total += weight * axis.size(k) * v.abs();
+                    net += sign * face.of_point(weight, t) * v;
+                    total += face.of_point(weight, t) * v.abs();
                 }
             }
         }
@@ -301,7 +300,9 @@ pub(super) fn boundary(
                 .is_some_and(|parts| parts.solids.iter().any(|s| s.no_slip || s.outline.holds(c)))
     };
     // Inertia determines the velocity of a body that nothing holds.
-    let free_translation = [0, 1].map(|c| !held(c) && !inertia);
+    // No flow around an axis is a translation along the radius.
+    let round = mesh.measure().is_ring();
+    let free_translation = [0, 1].map(|c| !held(c) && !inertia && !(round && c == 0));
     let compressible = state.materials.iter().any(|m| m.law.compliance > 0.0);
     let closed = !compressible
         && pieces(&sides).all(|(s, p)| p.conditions.velocity[side_normal(s)].is_some());
@@ -327,8 +328,9 @@ pub(super) fn boundary(
             return Err(SceneError::of_key(
                 "boundaries",
                 format!(
-                    "the given normal velocities let {:.3e} m2/s of incompressible fluid flow out",
-                    net * units.area_rate()
+                    "the given normal velocities let {:.3e} {} of incompressible fluid flow out",
+                    net * units.volume_rate(),
+                    if mesh.measure().is_ring() { "m3/s" } else { "m2/s" }
                 ),
                 "make them balance, open a side or a part of one (kind = \"outflow\"), or give a bulk_viscosity",
             ));

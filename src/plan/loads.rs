@@ -59,8 +59,8 @@ fn add_tractions<const D: usize>(
                     let r = place(t);
                     let p = mesh.from_reference(cell, r).map(|v| v * units.length);
                     let n = Shape::values(r);
-                    let force =
-                        weight * mesh.face_area(cell, normal) * f.at(p[0], p[1]) / units.stress();
+                    let area = mesh.face(cell, s).of_point(weight, t);
+                    let force = area * f.at(p[0], p[1]) / units.stress();
                     for a in 0..NODES {
                         load[nodes[a]][c] += force * n[a];
                     }
@@ -84,10 +84,11 @@ fn add_body_force<const D: usize>(
     let scale = [units.force_density(), units.force_density(), units.stress()];
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let nodes = mesh.cell_nodes(cell);
-        let mut add = |r: [f64; 2], weight: f64| {
+        let measure = mesh.cell_measure(cell);
+        let mut add = |r: [f64; 2], share: f64| {
             let p = mesh.from_reference(cell, r).map(|v| v * units.length);
             let n = Shape::values(r);
-            let volume = weight * mesh.cell_volume(cell);
+            let volume = measure.of_share(share);
             for c in 0..D {
                 let f = volume * force[c].at(p[0], p[1]) / scale[c];
                 for a in 0..NODES {
@@ -101,7 +102,7 @@ fn add_body_force<const D: usize>(
         }
         for (eta, wy) in GAUSS_5 {
             for (xi, wx) in GAUSS_5 {
-                add([xi, eta], wx * wy);
+                add([xi, eta], measure.share(wx * wy, xi));
             }
         }
     }

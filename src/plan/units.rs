@@ -15,6 +15,9 @@ pub struct Units {
     pub time: f64,
     /// Density, kg/m3.
     pub density: f64,
+    /// Depth of the domain, m: 1 in the plane, the length around an axis, where volumes are those of
+    /// rings.
+    pub depth: f64,
 }
 
 /// The largest power of two that does not exceed a positive number; 1 for other numbers.
@@ -52,19 +55,23 @@ impl Units {
     pub fn couple_viscosity(&self) -> f64 {
         self.viscosity * self.length * self.length
     }
-    /// Area (volume per unit depth), m2.
-    pub fn area(&self) -> f64 {
-        self.length * self.length
+    /// Volume, m3 around an axis, m2 (per unit depth) in the plane.
+    pub fn volume(&self) -> f64 {
+        self.length * self.length * self.depth
     }
-    /// Area rate (volume flow per unit depth), m2/s.
-    pub fn area_rate(&self) -> f64 {
-        self.area() / self.time
+    /// Rate of a volume, m3/s, or m2/s in the plane.
+    pub fn volume_rate(&self) -> f64 {
+        self.volume() / self.time
     }
-    /// Power per unit depth, W/m.
+    /// Force, N, or N/m in the plane.
+    pub fn force(&self) -> f64 {
+        self.stress() * self.length * self.depth
+    }
+    /// Power, W, or W/m in the plane.
     pub fn power(&self) -> f64 {
-        self.stress() / self.time * self.area()
+        self.stress() / self.time * self.volume()
     }
-    /// Energy per unit depth, J/m.
+    /// Energy, J, or J/m in the plane.
     pub fn energy(&self) -> f64 {
         self.power() * self.time
     }

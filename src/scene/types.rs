@@ -141,10 +141,31 @@ pub struct Parameter {
     pub unit: String,
 }
 
+/// Geometry of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Geometry {
+    /// A plane flow: everything is per metre of depth.
+    #[default]
+    Plane,
+    /// A round flow: x is the distance from the axis, y the position along it. A left side at 0 is the
+    /// axis.
+    Axisymmetric,
+}
+
+fn is_plane(geometry: &Geometry) -> bool {
+    *geometry == Geometry::Plane
+}
+
 /// The rectangle that is meshed.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Domain {
+    /// `"plane"`: a plane flow, per metre of depth. `"axisymmetric"`: a round flow, in which x is the
+    /// distance from the axis and y the position along it; a left side at x = 0 is the axis.
+    #[serde(default, skip_serializing_if = "is_plane")]
+    #[schemars(extend("x-default" = "`\"plane\"`", "examples" = ["axisymmetric"]))]
+    pub geometry: Geometry,
     /// Range along x: lower and upper end.
     #[schemars(extend("x-unit" = "m", "x-range" = "ascending", "examples" = [[0, 2]]))]
     pub x: [Quantity; 2],

@@ -70,12 +70,16 @@ pub fn particles(plan: &Plan) -> Result<(Particles, Vec<usize>), Unfilled> {
             let samples = samples(plan, cell);
             divide(plan, cell, &samples, &mut members);
         }
+        let measure = mesh.cell_measure(cell);
+        // Sections become rings, whose volumes add up to that of the cell.
+        let outwards: f64 = members.iter().map(|m| m.share * measure.tilt() * m.r[0]).sum();
         let (i, j) = mesh.cell_ij(cell);
         let angles = spread_angles(members.len(), [i, j], start, &mut random);
         let first = out.len();
         for (member, angle) in members.iter().zip(angles) {
             let position = mesh.from_reference(cell, member.r);
-            out.push(position, member.share * mesh.cell_volume(cell), member.material);
+            let share = measure.share(member.share, member.r[0]) / (1.0 + outwards);
+            out.push(position, measure.of_share(share), member.material);
             let last = out.len() - 1;
             let si = plan.si(position);
             member.filling.iter().for_each(|&f| empty[f] = false);
@@ -127,7 +131,7 @@ fn places(plan: &Plan) -> Particles {
 struct Member {
     /// Reference coordinates.
     r: [f64; 2],
-    /// Fraction of the cell's area.
+    /// Fraction of the section of the cell.
     share: f64,
     material: u8,
     filling: Filling,

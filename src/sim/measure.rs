@@ -63,9 +63,9 @@ impl<const D: usize> Simulation<D> {
             if (0..materials.len())
                 .any(|m| layered(m) && self.quadrature.composition().fraction(cell, m) > 0.0)
             {
-                let [hx, hy] = mesh.cell_size(cell);
                 let nodal = self.flow.of_cell(mesh, cell);
-                let rates = rates(&PointShape::new(&centre, [hx, hy]), &nodal);
+                let shape = PointShape::new(&centre, mesh.whole_measure(cell), 0.0);
+                let rates = rates(&shape, &nodal);
                 let spin = rates.relative_spin.abs();
                 let rate = (2.0 * rates.strain_squared()).sqrt() + spin;
                 speeds.strain_rate = speeds.strain_rate.max(rate);
@@ -144,7 +144,7 @@ impl<const D: usize> Simulation<D> {
     /// Forces of the materials on what the gauges of forces name, from the residual of the flow.
     fn forces(&self) -> Vec<ForceRow> {
         let (plan, mesh) = (&self.plan, &self.plan.mesh);
-        let force = plan.units.stress() * plan.units.length;
+        let force = plan.units.force();
         let of = |gauge: &ForceGauge| {
             let mut sum = ForceRow::default();
             for &(node, carries) in &gauge.nodes {
@@ -237,10 +237,10 @@ impl<const D: usize> Simulation<D> {
         let mut gauges = std::mem::take(&mut self.row.gauges);
         gauges.clear();
         gauges.extend(self.gauges.iter().map(|g| GaugeRow {
-            volume: g.volume * u.area(),
-            refilled: g.refilled * u.area(),
+            volume: g.volume * u.volume(),
+            refilled: g.refilled * u.volume(),
             rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
-                * u.area_rate(),
+                * u.volume_rate(),
         }));
         let mut ill_posed_share = 0.0;
         if plan.has_friction() {

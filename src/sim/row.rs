@@ -410,11 +410,11 @@ columns! {
     /// Number of times that a wall stopped a particle since the start.
     held: u64 = |m| m.count.held, 0, { label: "held at walls", rank: Rank::Never };
     /// Volume that has entered through sides since the start.
-    volume_in: f64 = |m| m.count.volume_in * m.units.area(), 0.0, {
+    volume_in: f64 = |m| m.count.volume_in * m.units.volume(), 0.0, {
         unit: "m²", label: "volume in", exists: Plan::exchanges_volume,
     };
     /// Volume that has left through sides since the start.
-    volume_out: f64 = |m| m.count.volume_out * m.units.area(), 0.0, {
+    volume_out: f64 = |m| m.count.volume_out * m.units.volume(), 0.0, {
         unit: "m²", label: "volume out", exists: Plan::exchanges_volume,
     };
     /// Number of iterations for friction, yield stresses and power laws, in the solution at the end of

@@ -152,7 +152,9 @@ impl<const D: usize> Simulation<D> {
                     let l =
                         gradient(&nodal.map(|v| [v[0], v[1]]), &Shape::at(r), mesh.cell_size(cell));
                     let d = (l + l.transpose()) * 0.5;
-                    (2.0 * d.norm_squared()).sqrt() * u.rate()
+                    let hoop = mesh.whole_measure(cell).per_radius(r[0])
+                        * interpolate(&nodal, &Shape::values(r))[0];
+                    (2.0 * (d.norm_squared() + hoop * hoop)).sqrt() * u.rate()
                 }
                 ColourBy::Viscosity => {
                     let m = &self.matter.materials[self.particles.material[p] as usize];
@@ -215,8 +217,7 @@ impl<const D: usize> Simulation<D> {
                     };
                     (match name {
                         FieldName::Pressure => {
-                            let [p, by_xi, by_eta] = self.flow.pressure[cell];
-                            (p + by_xi * x.r + by_eta * y.r) * plan.units.stress()
+                            self.flow.pressure_in(mesh, cell, [x.r, y.r]) * plan.units.stress()
                         }
                         FieldName::Speed => velocity(0).hypot(velocity(1)) * plan.units.velocity(),
                         _ if !self.rotates(cell) => f64::NAN,

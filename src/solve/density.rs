@@ -34,6 +34,7 @@ use crate::composition::Content;
 use crate::composition::centroids::Centroids;
 use crate::plan::material::Material;
 use crate::space::fit::{Degree, Fit, Polynomial};
+use crate::space::measure::CellMeasure;
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Neighbours;
 use crate::space::particles::Particles;
@@ -69,6 +70,8 @@ pub struct Density {
     bounded: bool,
     /// Parts of cells with solids of any shape in them; their density is constant.
     parts: SharedParts,
+    /// Measures of the cells.
+    measures: Vec<CellMeasure>,
 }
 
 /// Densities of a cell cut by a straight line, at the points of [`GAUSS_6X6`].
@@ -125,6 +128,7 @@ impl Density {
             densities: Vec::with_capacity(materials),
             bounded,
             parts: mesh.shared_parts(),
+            measures: (0..mesh.cells()).map(|cell| mesh.whole_measure(cell)).collect(),
         }
     }
 
@@ -176,9 +180,14 @@ impl Density {
         self.parts.as_deref()?.of(cell)
     }
 
-    /// Mean density of a cell.
+    /// Mean density of the section of a cell.
     pub fn mean(&self, cell: usize) -> f64 {
         self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum()
+    }
+
+    /// Share of a point of the plane in the volume of a cell.
+    fn share(&self, cell: usize, weight: f64, r: [f64; 2]) -> f64 {
+        self.measures[cell].share(weight, r[0])
     }
 
     /// Gradient of the density inside a cell, per reference coordinate.
@@ -197,12 +206,14 @@ impl Density {
         } else if let Some(sides) = &self.of_sides[cell] {
             let densities = sides.density.iter().zip(&sides.kinked);
             for ((density, kinked), g) in densities.zip(GAUSS_6X6.iter()) {
-                let [mass, kinked] = [density, kinked].map(|d| g.weight * d);
+                let weight = self.share(cell, g.weight, g.r);
+                let [mass, kinked] = [density, kinked].map(|d| weight * d);
                 f(MassPoint { mass, kinked, r: g.r, n: &g.shape.n });
             }
         } else {
             for (density, g) in self.at_gauss[cell].iter().zip(GAUSS_3X3.iter()) {
-                f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
+                let mass = self.share(cell, g.weight, g.r) * density;
+                f(MassPoint { mass, kinked: 0.0, r: g.r, n: &g.shape.n });
             }
         }
     }
@@ -215,7 +226,8 @@ impl Density {
         }
         for (q, g) in GAUSS_6X6.iter().enumerate() {
             let density = at_fine_point(&self.at_gauss[cell], q);
-            f(MassPoint { mass: g.weight * density, kinked: 0.0, r: g.r, n: &g.shape.n });
+            let mass = self.share(cell, g.weight, g.r) * density;
+            f(MassPoint { mass, kinked: 0.0, r: g.r, n: &g.shape.n });
         }
     }
 
@@ -260,8 +272,7 @@ impl Density {
         for m in 0..materials.len() {
             let share = self.centroids.share(m);
             if share > 0.0 {
-                let [x, y] = self.centroids.centroid(m).map(|c| 3.0 * c);
-                density += share * (1.0 + x * r[0] + y * r[1]) * self.of_material(m, r, materials);
+                density += self.centroids.share_at(m, r) * self.of_material(m, r, materials);
             }
         }
         density

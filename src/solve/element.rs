@@ -6,6 +6,7 @@
 
 use crate::laws::rates::Rates;
 use crate::space::embedding::CellMap;
+use crate::space::measure::CellMeasure;
 use crate::space::shape::{CENTRE, NODES, Shape};
 
 /// Number of local unknowns with rotation; classical elements use the first 18.
@@ -24,17 +25,25 @@ pub struct PointShape {
     pub gx: [f64; NODES],
     /// Derivatives along y.
     pub gy: [f64; NODES],
+    /// One over the radius; zero in the plane.
+    pub per_radius: f64,
 }
 
 impl PointShape {
-    /// Converts the reference derivatives of a cell of size `[hx, hy]`.
-    pub fn new(s: &Shape, [hx, hy]: [f64; 2]) -> Self {
-        PointShape { n: s.n, gx: s.d_xi.map(|d| d * 2.0 / hx), gy: s.d_eta.map(|d| d * 2.0 / hy) }
+    /// Converts the reference derivatives at the reference coordinate `xi` of a cell.
+    pub fn new(s: &Shape, cell: CellMeasure, xi: f64) -> Self {
+        let [hx, hy] = cell.size;
+        PointShape {
+            n: s.n,
+            gx: s.d_xi.map(|d| d * 2.0 / hx),
+            gy: s.d_eta.map(|d| d * 2.0 / hy),
+            per_radius: cell.per_radius(xi),
+        }
     }
 }
 
 /// Gradient of the nodal unknowns at a point: the derivatives `x[c]` and `y[c]` of component `c`,
-/// and the value `w` of the rotation.
+/// the value `w` of the rotation, and the hoop rate and hoop curvature around an axis.
 #[derive(Clone, Copy)]
 pub struct Gradient<const D: usize> {
     /// Derivative of each component along x.
@@ -43,12 +52,14 @@ pub struct Gradient<const D: usize> {
     pub(super) y: [f64; D],
     /// Rotation rate; zero without rotation.
     pub(super) w: f64,
+    /// `u/x` and `w/x`; `None` in the plane.
+    pub(super) hoop: Option<[f64; 2]>,
 }
 
 impl<const D: usize> Gradient<D> {
     /// Gradient at a point of a cell with the nodal values `u`.
     pub fn at(s: &PointShape, u: &Nodal<D>) -> Self {
-        let mut g = Gradient { x: [0.0; D], y: [0.0; D], w: 0.0 };
+        let mut g = Gradient { x: [0.0; D], y: [0.0; D], w: 0.0, hoop: None };
         for a in 0..NODES {
             for c in 0..D {
                 g.x[c] += s.gx[a] * u[a][c];
@@ -58,6 +69,10 @@ impl<const D: usize> Gradient<D> {
                 g.w += s.n[a] * u[a][D - 1];
             }
         }
+        if s.per_radius != 0.0 {
+            let along: f64 = (0..NODES).map(|a| s.n[a] * u[a][0]).sum();
+            g.hoop = Some([s.per_radius * along, s.per_radius * g.w]);
+        }
         g
     }
 
@@ -65,10 +80,14 @@ impl<const D: usize> Gradient<D> {
     #[inline(always)]
     pub fn rates(&self) -> Rates {
         let gradient = [[self.x[0], self.y[0]], [self.x[1], self.y[1]]];
-        if D == 3 {
+        let rates = if D == 3 {
             Rates::cosserat(gradient, self.w, [self.x[D - 1], self.y[D - 1]])
         } else {
             Rates::classical(gradient)
+        };
+        match self.hoop {
+            Some([hoop, kappa]) => rates.around_axis(hoop, kappa),
+            None => rates,
         }
     }
 }

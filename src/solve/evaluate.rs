@@ -168,7 +168,8 @@ impl Evaluation<'_> {
                     if share > 0.0 {
                         // The integration points have the stresses of the rotation.
                         let softening = softening.map(Softening::of_shear);
-                        out.soften(Place::Fine(q as u8), g.weight * share * cut.trust, softening);
+                        let weight = measure.share(g.weight, g.r[0]) * share * cut.trust;
+                        out.soften(Place::Fine(q as u8), weight, softening);
                     }
                     law
                 })

@@ -38,7 +38,8 @@ impl Evaluation<'_> {
                 return Form::Film;
             }
             let [_, b] = between;
-            return match StraightCut::new(centroids.share(b), centroids.centroid(b)) {
+            let (share, centroid) = centroids.in_section(b);
+            return match StraightCut::new(share, centroid) {
                 Some(cut) => Form::Sides { cut, between },
                 None => Form::Weights,
             };

@@ -18,8 +18,10 @@
 //! + c b_h int |(1 - P)(g + k e)|^2 + c a_h int |(1 - R) e|^2 + d beta_h int tr(D)^2
 //! ```
 //! with integrals of a, b, k over the true shape of either side, `P` the L2 projection on P1, and
-//! harmonic means `b_h`, `a_h`, `beta_h`: the softer part resists the remainders of the fits. All
-//! terms are squares with positive weights. For any positions of the particles the matrix is
+//! harmonic means `b_h`, `a_h`, `beta_h`: the softer part resists the remainders of the fits. Around an
+//! axis the hoop rate `D_hoop = u/x` is continuous too: `e` is `-2 D_tt - D_hoop` (with `-tr D` instead of
+//! `D_nn`, and the whole trace), and `int c (D_hoop - r^2 tr(D)/3)^2` is added with the mean of the hoop
+//! viscosities `c`. All terms are squares with positive weights. For any positions of the particles the matrix is
 //! therefore positive semi-definite, and its null space contains only rigid motions.
 //!
 //! **Pressure.** An incompressible flow has `D_nn - D_tt = -2 D_tt`, yet the choice determines the
@@ -115,6 +117,20 @@ impl Frame {
             row[a] = (z + x) * s.gx[a] + y * s.gy[a];
             row[NODES + a] = (z - x) * s.gy[a] + y * s.gx[a];
         }
+        if s.per_radius != 0.0 {
+            for a in 0..NODES {
+                row[a] += z * s.per_radius * s.n[a];
+            }
+        }
+        row
+    }
+
+    /// The hoop rate less a third of the part of the trace that `e` has.
+    fn hoop(&self, s: &PointShape) -> Row {
+        let mut row = Frame::row(s, [0.0; 2], (self.lack - 1.0) / 3.0);
+        for a in 0..NODES {
+            row[a] += s.per_radius * s.n[a];
+        }
         row
     }
 
@@ -179,7 +195,7 @@ fn coefficients(cut: &Cut, frame: &Frame) -> ([[f64; 3]; SUBPOINTS], Means) {
             for (sum, v) in at.iter_mut().zip([a, b_inverse, k]) {
                 *sum += phi * v;
             }
-            let w = g.weight * phi;
+            let w = cut.cell.share(g.weight, g.r[0]) * phi;
             means.a += w * a;
             means.a_inverse += w / a;
             means.b += w / b_inverse;
@@ -215,57 +231,64 @@ pub fn matrix(cut: &Cut) -> VelocityMatrix {
     let loose = LOOSE + (1.0 - LOOSE) * r;
 
     // Integrals over the two sides.
-    let volume = cut.cell.volume();
+    let (cell, volume) = (cut.cell, cut.cell.volume());
+    let mut k = [[0.0; N]; N];
     let mut compliance = [[0.0; 3]; 3];
     let mut tension = [[0.0; 2]; 2];
     let mut stretch = [[0.0; N]; 2];
     let mut shear = [[0.0; N]; 3];
-    for (g, [a, b_inverse, k]) in GAUSS_6X6.iter().zip(at) {
-        let s = PointShape::new(&g.shape, cut.cell.size);
+    for (q, (g, [a, b_inverse, slant])) in GAUSS_6X6.iter().zip(at).enumerate() {
+        let s = PointShape::new(&g.shape, cell, g.r[0]);
+        let weight = cell.share(g.weight, g.r[0]);
         let e = frame.stretch(&s);
-        let v = [1.0, g.r[0], g.r[1]];
+        let v = cell.pressure_basis(g.r);
         let u = [1.0, frame.along(g.r, cut.cell.size)];
         for i in 0..3 {
             for j in 0..=i {
-                compliance[i][j] += g.weight * b_inverse * v[i] * v[j];
+                compliance[i][j] += weight * b_inverse * v[i] * v[j];
             }
-            if k != 0.0 {
-                add_row(&mut shear[i], g.weight * k * v[i], &e);
+            if slant != 0.0 {
+                add_row(&mut shear[i], weight * slant * v[i], &e);
             }
         }
         for i in 0..2 {
             for j in 0..=i {
-                tension[i][j] += g.weight * a * u[i] * u[j];
+                tension[i][j] += weight * a * u[i] * u[j];
             }
-            add_row(&mut stretch[i], g.weight * a * u[i], &e);
+            add_row(&mut stretch[i], weight * a * u[i], &e);
+        }
+        if cell.is_ring() {
+            let share = cut.interface.share[q];
+            let hoop = (1.0 - share) * cut.sides[0][q].hoop + share * cut.sides[1][q].hoop;
+            add_square(&mut k, volume * weight * hoop, &frame.hoop(&s));
         }
     }
     // Integrals over the whole cell, for which the 3 x 3 rule is exact.
     let mut fitted = [[0.0; N]; 3];
-    let shape = GAUSS_3X3.each_ref().map(|g| PointShape::new(&g.shape, cut.cell.size));
+    let shape = GAUSS_3X3.each_ref().map(|g| PointShape::new(&g.shape, cell, g.r[0]));
     let sheared = shape.each_ref().map(|s| {
         let mut row = frame.shear(s);
         add_row(&mut row, means.k, &frame.stretch(s));
         row
     });
+    let squares = cell.pressure_squares();
     for ((g, s), row) in GAUSS_3X3.iter().zip(&shape).zip(&sheared) {
         let along = frame.shear(s);
-        for (i, v) in [1.0, g.r[0], g.r[1]].into_iter().enumerate() {
-            add_row(&mut shear[i], g.weight * v, &along);
-            let mass = if i == 0 { 1.0 } else { 1.0 / 3.0 };
-            add_row(&mut fitted[i], g.weight * v / mass, row);
+        let weight = cell.share(g.weight, g.r[0]);
+        for (i, v) in cell.pressure_basis(g.r).into_iter().enumerate() {
+            add_row(&mut shear[i], weight * v, &along);
+            add_row(&mut fitted[i], weight * v / squares[i], row);
         }
     }
 
-    let mut k = [[0.0; N]; N];
     lower_solve(&mut compliance, &mut shear);
     shear.iter().for_each(|row| add_square(&mut k, volume, row));
     lower_solve(&mut tension, &mut stretch);
     stretch.iter().for_each(|row| add_square(&mut k, volume, row));
     upper_solve(&tension, &mut stretch);
     for ((g, s), mut row) in GAUSS_3X3.iter().zip(&shape).zip(sheared) {
-        let w = volume * g.weight;
-        for (fit, v) in fitted.iter().zip([1.0, g.r[0], g.r[1]]) {
+        let w = volume * cell.share(g.weight, g.r[0]);
+        for (fit, v) in fitted.iter().zip(cell.pressure_basis(g.r)) {
             add_row(&mut row, -v, fit);
         }
         add_square(&mut k, w * loose * b_h, &row);
@@ -342,25 +365,34 @@ mod tests {
     use crate::space::mesh::{Axis, Mesh};
     use crate::space::particles::Particles;
     use crate::space::seeding::Seeding;
+    use crate::space::shape::GaussPoint;
     use nalgebra::SMatrix;
 
     const SIZE: [f64; 2] = [0.7, 1.3];
 
     fn isotropic(eta: f64) -> PointLaw {
-        PointLaw { shear: Sym2::isotropic(eta), dilation: eta, ..PointLaw::default() }
+        let shear = Sym2::isotropic(eta);
+        PointLaw { shear, dilation: eta, hoop: 3.0 * eta, ..PointLaw::default() }
     }
 
     fn layered(eta: f64, eta_s: f64, angle: f64) -> PointLaw {
         let shear = layered::shear(eta, eta_s, &Orientation::of([angle.cos(), angle.sin()]));
-        PointLaw { shear, dilation: eta, ..PointLaw::default() }
+        PointLaw { shear, dilation: eta, hoop: 3.0 * eta, ..PointLaw::default() }
     }
 
+    const PLANE: Measure = Measure::PLANE;
+
     fn of(interface: &Interface, a: PointLaw, b: PointLaw) -> VelocityMatrix {
-        matrix(&Cut {
-            interface,
-            sides: &[[a; SUBPOINTS], [b; SUBPOINTS]],
-            cell: Measure::PLANE.of_cell(SIZE),
-        })
+        in_cell(PLANE.of_cell(SIZE, 0.0), interface, a, b)
+    }
+
+    fn in_cell(
+        cell: CellMeasure,
+        interface: &Interface,
+        a: PointLaw,
+        b: PointLaw,
+    ) -> VelocityMatrix {
+        matrix(&Cut { interface, sides: &[[a; SUBPOINTS], [b; SUBPOINTS]], cell })
     }
 
     /// A straight interface through the cell, with the second material above it.
@@ -374,12 +406,16 @@ mod tests {
         Interface { share, normal, sheet: false, trust: 1.0 }
     }
 
-    fn standard(law: &PointLaw) -> Matrix {
+    /// With the points of the laminate: hoop rates are not polynomials.
+    fn standard(cell: CellMeasure, law: &PointLaw) -> Matrix {
         let mut k: Matrix = [[0.0; LOCAL]; LOCAL];
-        for g in GAUSS_3X3.iter() {
-            let volume = g.weight * SIZE[0] * SIZE[1];
-            add_stiffness::<2>(&mut k, &PointShape::new(&g.shape, SIZE), law, volume);
-        }
+        let mut add = |g: &GaussPoint, law: &PointLaw| {
+            let volume = cell.of_point(g.weight, g.r[0]);
+            add_stiffness::<2>(&mut k, &PointShape::new(&g.shape, cell, g.r[0]), law, volume);
+        };
+        GAUSS_3X3.iter().for_each(|g| add(g, &PointLaw { hoop: 0.0, ..*law }));
+        let hoop = PointLaw { hoop: law.hoop, ..PointLaw::default() };
+        GAUSS_6X6.iter().for_each(|g| add(g, &hoop));
         mirror::<2>(&mut k);
         k
     }
@@ -397,12 +433,14 @@ mod tests {
     fn equal_laws_give_the_standard_matrix() {
         let compressible = PointLaw { dilation: 0.0, ..isotropic(2.0) };
         for law in [isotropic(2.5), layered(3.0, 0.2, 0.4), compressible] {
-            let expected = standard(&law);
-            for (angle, offset) in [(0.3, 0.1), (1.5, -0.2), (-0.8, 0.0)] {
-                let k = of(&straight(angle, offset), law, law);
-                for i in 0..N {
-                    for j in 0..N {
-                        assert!((k[i][j] - expected[i][j]).abs() < 1e-11, "{i}, {j}");
+            for cell in [PLANE.of_cell(SIZE, 0.0), Measure::RING.of_cell(SIZE, 0.8)] {
+                let expected = standard(cell, &law);
+                for (angle, offset) in [(0.3, 0.1), (1.5, -0.2), (-0.8, 0.0)] {
+                    let k = in_cell(cell, &straight(angle, offset), law, law);
+                    for i in 0..N {
+                        for j in 0..N {
+                            assert!((k[i][j] - expected[i][j]).abs() < 1e-10, "{i}, {j}");
+                        }
                     }
                 }
             }

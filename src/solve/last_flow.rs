@@ -42,14 +42,14 @@ pub struct Iterate<'a, const D: usize> {
 
 impl<const D: usize> Iterate<'_, D> {
     fn pressure_at(&self, cell: usize, r: [f64; 2]) -> f64 {
-        let basis = self.mesh.measure().pressure_basis(r);
+        let basis = self.mesh.whole_measure(cell).pressure_basis(r);
         self.pressure[cell].iter().zip(basis).map(|(p, q)| p * q).sum()
     }
 }
 
 impl<const D: usize> LastFlow for Iterate<'_, D> {
     fn at(&self, cell: usize, r: [f64; 2]) -> Option<LocalFlow> {
-        let shape = PointShape::new(&Shape::at(r), self.mesh.cell_size(cell));
+        let shape = PointShape::new(&Shape::at(r), self.mesh.whole_measure(cell), r[0]);
         let nodal = self.mesh.cell_nodes(cell).map(|n| self.velocity[n]);
         Some(LocalFlow { rates: rates(&shape, &nodal), pressure: self.pressure_at(cell, r) })
     }

@@ -204,9 +204,9 @@ impl<const D: usize> Fresh<D> {
             let law = cut.map_or(law, |cut| law.with_viscosity_scaled(cut.rest));
             add_stiffness::<D>(
                 &mut k,
-                &PointShape::new(shape, size),
+                &PointShape::new(shape, measure, p.r[0]),
                 &law,
-                measure.of_point(p.weight),
+                measure.of_share(p.weight),
             );
             turning += p.weight * p.law.turning_viscosity(thickness);
         });

@@ -32,10 +32,11 @@ impl Quadrature {
             fractions[material as usize] = 1.0;
             if range.is_empty() {
                 let (law, density) = (super::evaluate::uniform(m), m.density);
+                let measure = mesh.whole_measure(cell);
                 self.points.extend(GAUSS_3X3.iter().map(|g| IntegrationPoint {
                     law,
                     density,
-                    weight: g.weight,
+                    weight: measure.share(g.weight, g.r[0]),
                     r: g.r,
                 }));
             }

@@ -55,6 +55,15 @@ pub enum Place {
 }
 
 impl Place {
+    /// Reference coordinates of the point.
+    pub fn r(self) -> [f64; 2] {
+        match self {
+            Place::Gauss(g) => GAUSS_3X3[usize::from(g)].r,
+            Place::Fine(g) => GAUSS_6X6[usize::from(g)].r,
+            Place::At(r) => r,
+        }
+    }
+
     /// Shape functions at the point.
     pub fn shape(self) -> Shape {
         match self {

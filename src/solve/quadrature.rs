@@ -88,8 +88,8 @@ impl Quadrature {
             Rule::Mixture | Rule::Laminate | Rule::Sides => {
                 let mut points = vec![IntegrationPoint::default(); 9 * cells];
                 for (k, point) in points.iter_mut().enumerate() {
-                    let g = &GAUSS_3X3[k % 9];
-                    (point.weight, point.r) = (g.weight, g.r);
+                    let (g, cell) = (&GAUSS_3X3[k % 9], mesh.whole_measure(k / 9));
+                    (point.weight, point.r) = (cell.share(g.weight, g.r[0]), g.r);
                 }
                 for (cell, part) in mesh.parts().into_iter().flat_map(Parts::all) {
                     for (point, of) in points[9 * cell..].iter_mut().zip(&part.points) {

@@ -77,10 +77,18 @@ impl Kinked {
     }
 
     /// Rates of `psi t` at a point, continued from the first and from the second side.
-    fn rates(&self, g: &GaussPoint, size: [f64; 2]) -> [Rates; 2] {
-        self.kink.slopes(g).map(|slopes| {
-            let slopes = [0, 1].map(|c| slopes[c] * 2.0 / size[c]);
+    fn rates(&self, g: &GaussPoint, cell: CellMeasure) -> [Rates; 2] {
+        let in_plane = self.kink.slopes(g).map(|slopes| {
+            let slopes = [0, 1].map(|c| slopes[c] * 2.0 / cell.size[c]);
             Rates::classical(self.kink.along.map(|t| slopes.map(|s| s * t)))
+        });
+        if !cell.is_ring() {
+            return in_plane;
+        }
+        let per_radius = cell.per_radius(g.r[0]);
+        let psi = self.kink.values(g);
+        [0, 1].map(|side| {
+            in_plane[side].around_axis(per_radius * psi[side] * self.kink.along[0], 0.0)
         })
     }
 
@@ -107,11 +115,11 @@ impl Kinked {
         let mut coupled = [0.0; 2 * NODES];
         let mut itself = 0.0;
         for (g, &share) in GAUSS_6X6.iter().zip(&cut.share) {
-            let s = PointShape::new(&g.shape, cell.size);
-            let rates = self.rates(g, cell.size);
+            let s = PointShape::new(&g.shape, cell, g.r[0]);
+            let rates = self.rates(g, cell);
             let shares = [1.0 - share, share];
             for side in 0..2 {
-                let volume = cell.of_point(g.weight * shares[side]);
+                let volume = cell.of_point(g.weight * shares[side], g.r[0]);
                 itself += volume * laws[side].power(&rates[side]);
                 add_forces(&mut coupled, &s, &laws[side], &rates[side], volume);
                 if side == stiffer {
@@ -138,16 +146,21 @@ impl Kinked {
 fn minus(a: &PointLaw, b: &PointLaw) -> PointLaw {
     let mut shear: Sym2 = a.shear;
     shear.add_scaled(-1.0, &b.shear);
-    PointLaw { shear, dilation: a.dilation - b.dilation, ..PointLaw::default() }
+    let (dilation, hoop) = (a.dilation - b.dilation, a.hoop - b.hoop);
+    PointLaw { shear, dilation, hoop, ..PointLaw::default() }
 }
 
 /// Adds the forces of the stress at the rates `r` on the nodes, component by component.
 fn add_forces(f: &mut [f64; 2 * NODES], s: &PointShape, law: &PointLaw, r: &Rates, volume: f64) {
-    let stress = law.stress(r, volume);
-    let [d0, d1] = stress.deviator;
+    let ([[xx, xy], [yx, yy]], hoop) = law.stress(r, volume).components();
     for a in 0..NODES {
-        f[a] += (stress.mean + d0) * s.gx[a] + d1 * s.gy[a];
-        f[NODES + a] += (stress.mean - d0) * s.gy[a] + d1 * s.gx[a];
+        f[a] += xx * s.gx[a] + xy * s.gy[a];
+        f[NODES + a] += yy * s.gy[a] + yx * s.gx[a];
+    }
+    if s.per_radius != 0.0 {
+        for a in 0..NODES {
+            f[a] += hoop * s.per_radius * s.n[a];
+        }
     }
 }
 
@@ -199,12 +212,17 @@ fn integrated<'a>(
         let mut mixture = Mixture::parallel();
         mixture.add(first, &laws[0]);
         mixture.add(second, &laws[1]);
-        let (s, law) = (PointShape::new(&g.shape, cell.size), mixture.law());
+        let (s, law) = (PointShape::new(&g.shape, cell, g.r[0]), mixture.law());
         for (i, row) in k.iter_mut().enumerate() {
             let slope = [s.gx[i % NODES], s.gy[i % NODES]];
             let mut gradient = [[0.0; 2]; 2];
             gradient[i / NODES] = slope;
-            add_forces(row, &s, &law, &Rates::classical(gradient), cell.of_point(g.weight));
+            let mut rates = Rates::classical(gradient);
+            if cell.is_ring() {
+                let along = if i < NODES { s.n[i] } else { 0.0 };
+                rates = rates.around_axis(s.per_radius * along, 0.0);
+            }
+            add_forces(row, &s, &law, &rates, cell.of_point(g.weight, g.r[0]));
         }
     }
     k
@@ -248,8 +266,8 @@ mod tests {
             for exponent in [-8, -4, 0, 4, 8] {
                 let thin = 10f64.powi(exponent).min(1.0);
                 let laws = [law(1.0), law(10f64.powi(exponent))];
-                let (k, _) =
-                    matrix(&cut(seed), &laws, Measure::PLANE.of_cell(SIZE), Ramp::new([false; 4]));
+                let cell = Measure::PLANE.of_cell(SIZE, 0.0);
+                let (k, _) = matrix(&cut(seed), &laws, cell, Ramp::new([false; 4]));
                 let k = SMatrix::<f64, 18, 18>::from_fn(|i, j| k[i][j]);
                 let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
                 values.sort_by(f64::total_cmp);
@@ -262,18 +280,38 @@ mod tests {
     }
 
     #[test]
-    fn equal_laws_give_the_uniform_matrix() {
-        let cell = Measure::PLANE.of_cell(SIZE);
-        let (k, _) = matrix(&cut(3), &[law(2.0), law(2.0)], cell, Ramp::new([false; 4]));
-        let mut uniform: Matrix = [[0.0; LOCAL]; LOCAL];
-        for g in GAUSS_6X6.iter() {
-            let shape = PointShape::new(&g.shape, SIZE);
-            add_stiffness::<2>(&mut uniform, &shape, &law(2.0), cell.of_point(g.weight));
+    fn definite_around_an_axis() {
+        for seed in 0..60 {
+            for exponent in [-4, 0, 4] {
+                let laws = [law(1.0), law(10f64.powi(exponent))];
+                let cell = Measure::RING.of_cell(SIZE, 0.35 + 0.1 * f64::from(seed % 7));
+                let (k, _) = matrix(&cut(seed), &laws, cell, Ramp::new([false; 4]));
+                let k = SMatrix::<f64, 18, 18>::from_fn(|i, j| k[i][j]);
+                let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
+                values.sort_by(f64::total_cmp);
+                // Only the translation along the axis is rigid.
+                let rounding = 1e-12 * values[17];
+                assert!(values[0].abs() < rounding, "{seed} {exponent}: {values:?}");
+                assert!(values[1] > rounding, "{seed} {exponent}: {values:?}");
+            }
         }
-        mirror::<2>(&mut uniform);
-        for i in 0..18 {
-            for j in 0..18 {
-                assert!((k[i][j] - uniform[i][j]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn equal_laws_give_the_uniform_matrix() {
+        for cell in [Measure::PLANE.of_cell(SIZE, 0.0), Measure::RING.of_cell(SIZE, 0.8)] {
+            let (k, _) = matrix(&cut(3), &[law(2.0), law(2.0)], cell, Ramp::new([false; 4]));
+            let mut uniform: Matrix = [[0.0; LOCAL]; LOCAL];
+            for g in GAUSS_6X6.iter() {
+                let (shape, volume) =
+                    (PointShape::new(&g.shape, cell, g.r[0]), cell.of_point(g.weight, g.r[0]));
+                add_stiffness::<2>(&mut uniform, &shape, &law(2.0), volume);
+            }
+            mirror::<2>(&mut uniform);
+            for i in 0..18 {
+                for j in 0..18 {
+                    assert!((k[i][j] - uniform[i][j]).abs() < 1e-11);
+                }
             }
         }
     }

@@ -83,14 +83,21 @@ pub fn advance(
 
 /// The power of a stress with the rates of each unknown of a cell, by component.
 fn powers<const D: usize>(e: &Stress, s: &PointShape) -> [[f64; NODES]; D] {
-    let (xx, yy) = (e.mean + e.deviator[0], e.mean - e.deviator[0]);
-    let (xy, yx) = (e.deviator[1] - 0.5 * e.skew, e.deviator[1] + 0.5 * e.skew);
+    let ([[xx, xy], [yx, yy]], hoop) = e.components();
     let mut row = [[0.0; NODES]; D];
     for a in 0..NODES {
         row[0][a] = xx * s.gx[a] + xy * s.gy[a];
         row[1][a] = yx * s.gx[a] + yy * s.gy[a];
         if D == 3 {
             row[D - 1][a] = e.couple[0] * s.gx[a] + e.couple[1] * s.gy[a] - e.skew * s.n[a];
+        }
+    }
+    if s.per_radius != 0.0 {
+        for a in 0..NODES {
+            row[0][a] += hoop * s.per_radius * s.n[a];
+            if D == 3 {
+                row[D - 1][a] += e.hoop_couple * s.per_radius * s.n[a];
+            }
         }
     }
     row
@@ -104,7 +111,7 @@ impl SofteningPoint {
         if *slope == 0.0 {
             return;
         }
-        let s = PointShape::new(&self.place.shape(), cell.size);
+        let s = PointShape::new(&self.place.shape(), cell, self.place.r()[0]);
         let e = powers::<D>(&unit.stress(rates, 1.0), &s);
         // A stress that stiffens has no direction to be found.
         let (w, scale) = if *slope < 0.0 {
@@ -112,7 +119,7 @@ impl SofteningPoint {
         } else {
             (e, 1.0 / rate)
         };
-        let half = 0.5 * slope * scale * cell.of_point(self.weight);
+        let half = 0.5 * slope * scale * cell.of_share(self.weight);
         for c in 0..D {
             for a in 0..NODES {
                 let (we, ee) = (half * w[c][a], half * e[c][a]);

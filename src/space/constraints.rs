@@ -148,11 +148,12 @@ impl<const D: usize> Constraints<D> {
             let mut mean = 0.0;
             for cell in cells() {
                 let u = flow.of_cell(mesh, cell);
-                let inside: f64 = GAUSS_3X3
-                    .iter()
-                    .map(|g| g.weight * (0..NODES).map(|a| g.shape.n[a] * u[a][c]).sum::<f64>())
-                    .sum();
-                mean += inside * mesh.cell_volume(cell) / area;
+                let measure = mesh.cell_measure(cell);
+                let at = |n: &[f64; NODES]| (0..NODES).map(|a| n[a] * u[a][c]).sum::<f64>();
+                let points = GAUSS_3X3.iter();
+                let inside: f64 =
+                    points.map(|g| measure.share(g.weight, g.r[0]) * at(&g.shape.n)).sum();
+                mean += inside * measure.volume() / area;
             }
             flow.velocity.iter_mut().for_each(|u| u[c] -= mean);
         }

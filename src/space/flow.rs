@@ -35,7 +35,12 @@ impl<const D: usize> Flow<D> {
     /// Pressure at a point.
     pub fn pressure_at(&self, mesh: &Mesh, p: [f64; 2]) -> f64 {
         let cell = mesh.locate(p);
-        let [xi, eta] = mesh.to_reference(cell, p);
+        self.pressure_in(mesh, cell, mesh.to_reference(cell, p))
+    }
+
+    /// Pressure at reference coordinates of a cell.
+    pub fn pressure_in(&self, mesh: &Mesh, cell: usize, r: [f64; 2]) -> f64 {
+        let [_, xi, eta] = mesh.whole_measure(cell).pressure_basis(r);
         let [a, b, c] = self.pressure[cell];
         a + b * xi + c * eta
     }
@@ -101,19 +106,20 @@ impl<const D: usize> Flow<D> {
 
     /// Root-mean-square speed over all cells that are not solid.
     pub fn rms_speed(&self, mesh: &Mesh) -> f64 {
-        let [sum, area] = threads::sum(0..mesh.cells(), |cell| {
+        let [sum, volume] = threads::sum(0..mesh.cells(), |cell| {
             if mesh.solid[cell] {
                 return [0.0; 2];
             }
             let nodal = self.of_cell(mesh, cell);
+            let measure = mesh.cell_measure(cell);
             let squares = GAUSS_3X3.iter().map(|g| {
                 let u = interpolate(&nodal, &g.shape.n);
-                g.weight * (u[0] * u[0] + u[1] * u[1])
+                measure.share(g.weight, g.r[0]) * (u[0] * u[0] + u[1] * u[1])
             });
-            let area = mesh.cell_volume(cell);
-            [area * squares.sum::<f64>(), area]
+            let volume = measure.volume();
+            [volume * squares.sum::<f64>(), volume]
         });
-        (sum / area).sqrt()
+        (sum / volume).sqrt()
     }
 }
 

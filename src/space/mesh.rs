@@ -1,12 +1,15 @@
 //! This module defines the fixed tensor-product mesh: two axes of mesh lines, the nodes of the
 //! biquadratic element, and the cells.
 
-use super::measure::{CellMeasure, Measure};
+use super::measure::{CellMeasure, FaceMeasure, Measure};
 use super::parts::{Part, Parts, SharedParts};
 
 /// Distance from a mesh line, in cell sizes, below which a point counts as on the line. When the
 /// flow moves points along a line, rounding must not decide which of two cells contains them.
 pub const ON_LINE: f64 = 1e-10;
+
+/// Distance from the axis, in cell sizes, at which points on the axis are taken to be.
+const ON_AXIS: f64 = 1e-6;
 
 /// Largest reference coordinate at which a point is certainly inside the cell despite rounding.
 pub const INSIDE: f64 = 1.0 - 1e-9;
@@ -230,13 +233,17 @@ impl Mesh {
     }
     /// Measure of a cell, or of its part that solids leave free.
     pub fn cell_measure(&self, cell: usize) -> CellMeasure {
-        let whole = self.measure.of_cell(self.cell_size(cell));
+        let whole = self.whole_measure(cell);
         self.part(cell).map_or(whole, |part| whole.part(part.fraction))
+    }
+    /// Measure of a cell, with the solids in it.
+    pub fn whole_measure(&self, cell: usize) -> CellMeasure {
+        self.measure.of_cell(self.cell_size(cell), self.cell_centre(cell)[0])
     }
     /// Mass of the pressure basis by which divergences are weighted. That of a sliver beside a solid is
     /// that of a cell: what flows into it by rounding is little beside the volume of cells.
     pub fn divergence_mass(&self, cell: usize) -> [f64; 3] {
-        self.measure.of_cell(self.cell_size(cell)).pressure_mass()
+        self.whole_measure(cell).pressure_mass()
     }
     /// The solids of any shape, with the free parts of cells, if there are any.
     pub fn parts(&self) -> Option<&Parts> {
@@ -264,9 +271,17 @@ impl Mesh {
     pub fn cell_volume(&self, cell: usize) -> f64 {
         self.cell_measure(cell).volume()
     }
-    /// Area of a face of a cell whose normal has the direction `normal` (0 for x, 1 for y).
-    pub fn face_area(&self, cell: usize, normal: usize) -> f64 {
-        self.measure.of_face(self.cell_size(cell)[1 - normal])
+    /// Measure of a side of a cell, an index into [`SIDE_NODES`](super::shape::SIDE_NODES).
+    pub fn face(&self, cell: usize, side: usize) -> FaceMeasure {
+        self.whole_measure(cell).of_side(side)
+    }
+    /// Thickness at a point; on the axis, that very close to it.
+    pub fn thickness(&self, p: [f64; 2]) -> f64 {
+        self.measure.depth_at(p[0].max(self.x.start() + ON_AXIS * self.x.size(0)))
+    }
+    /// Area in the plane of the mesh of a volume around a point: the volume over the thickness.
+    pub fn section(&self, volume: f64, p: [f64; 2]) -> f64 {
+        volume / self.thickness(p)
     }
     /// Measure of integration.
     pub fn measure(&self) -> Measure {

@@ -125,7 +125,8 @@ impl Population {
             members.clear();
             members.extend(particles.of_cell(cell));
             let need = self.need(mesh, particles, cell);
-            let nominal = mesh.cell_volume(cell) / self.target() as f64;
+            let section = mesh.section(mesh.cell_volume(cell), mesh.cell_centre(cell));
+            let nominal = section / self.target() as f64;
             loop {
                 let place = |&p: &usize| mesh.to_reference(cell, particles.position[p]);
                 places.clear();
@@ -308,7 +309,7 @@ fn holds(centre: &[f64; 2], r: &[f64; 2]) -> bool {
     (0..2).all(|k| centre[k] * r[k] > -SAME)
 }
 
-/// The member nearest to `place` among those with at least `least_volume`; if there are none, the
+/// The member nearest to `place` among those with at least the section `least`; if there are none, the
 /// largest member.
 fn nearest(
     mesh: &Mesh,
@@ -316,16 +317,17 @@ fn nearest(
     cell: usize,
     members: &[usize],
     place: [f64; 2],
-    least_volume: f64,
+    least: f64,
 ) -> usize {
     let distance = |p: usize| {
         let r = mesh.to_reference(cell, particles.position[p]);
         (r[0] - place[0]).powi(2) + (r[1] - place[1]).powi(2)
     };
     let middle = |p: usize| from_middle(mesh, particles.position[p]);
-    let large = members.iter().copied().filter(|&p| particles.volume[p] >= least_volume);
+    let section = |p: usize| mesh.section(particles.volume[p], particles.position[p]);
+    let large = members.iter().copied().filter(|&p| section(p) >= least);
     cheapest(large.map(|p| (distance(p), middle(p), p)))
-        .or_else(|| cheapest(members.iter().map(|&p| (-particles.volume[p], middle(p), p))))
+        .or_else(|| cheapest(members.iter().map(|&p| (-section(p), middle(p), p))))
         .unwrap_or(members[0])
 }
 

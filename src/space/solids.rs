@@ -55,8 +55,7 @@ impl Mesh {
                 self.solid[cell] = true;
             } else if fraction < 1.0 - WHOLE || unresolved {
                 let sides = std::array::from_fn(|side| side_rule(side, distance));
-                let measure = self.measure().of_cell(self.cell_size(cell));
-                let part = part(measure, (fraction, rule), &sides, unresolved);
+                let part = part(self.whole_measure(cell), (fraction, rule), &sides, unresolved);
                 parts.cells[cell] = Some(Box::new(part));
             }
         }
@@ -88,7 +87,10 @@ impl Mesh {
             let c = side_normal(side);
             let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
             let nodes = SIDE_NODES[side].iter().zip(SIMPSON);
-            sign * self.face_area(cell, c) * nodes.map(|(&a, w)| w * u[a][c]).sum::<f64>()
+            let face = self.face(cell, side);
+            let along = [-1.0, 0.0, 1.0];
+            let points = nodes.zip(along).map(|((&a, w), t)| face.of_point(w, t) * u[a][c]);
+            sign * points.sum::<f64>()
         };
         (0..4).map(through).sum()
     }
@@ -183,7 +185,7 @@ fn part(
     // The integral of `q dN_a/dx_c` over the part.
     let mut whole = [[[0.0; NODES]; 2]; 3];
     for (r, weight) in &rule {
-        let (volume, shape) = (cell.of_point(*weight), Shape::at(*r));
+        let (volume, shape) = (cell.of_share(*weight), Shape::at(*r));
         for (row, q) in whole.iter_mut().zip([1.0, r[0], r[1]]) {
             for a in 0..NODES {
                 row[0][a] += volume * q * shape.d_xi[a] * 2.0 / cell.size[0];
@@ -200,14 +202,14 @@ fn part(
         let c = side_normal(side);
         let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
         for (r, weight) in rule {
-            let (area, n) = (sign * weight * cell.of_side(c), Shape::values(*r));
+            let (area, n) = (sign * weight * cell.of_side(side).area, Shape::values(*r));
             for (row, q) in divergence.iter_mut().zip([1.0, r[0], r[1]]) {
                 row[c].iter_mut().zip(n).for_each(|(entry, n)| *entry += area * q * n);
             }
         }
     }
     for p in &points {
-        let volume = cell.of_point(p.weight * fraction);
+        let volume = cell.of_share(p.weight * fraction);
         for c in 0..2 {
             let slope = 2.0 / cell.size[c];
             let row = divergence[1 + c][c].iter_mut();

@@ -371,7 +371,7 @@ fn compressible(out: &mut Vec<Trial>) {
                     let p = run.particles();
                     let marks = p.mark.iter().flatten();
                     let own = p.volume.iter().zip(marks).filter(|(_, mark)| **mark);
-                    let volume = own.map(|(v, _)| v).sum::<f64>() * run.plan().units.area();
+                    let volume = own.map(|(v, _)| v).sum::<f64>() * run.plan().units.volume();
                     let squeezed = 4.0 * (-0.4 * run.row().time).exp();
                     Ok(vec![Check::new("volume", volume, Bound::Within(squeezed, 1e-6))])
                 },

@@ -4,6 +4,7 @@
 //! `grainscope verify` prints and writes the report of [`run`]. The tests run the quick version of
 //! the same functions.
 
+mod axisymmetric;
 mod corners;
 mod cut_cells;
 mod elements;
@@ -46,7 +47,7 @@ impl Effort {
 type Subject = fn(Effort) -> Result<Section, CaseError>;
 
 /// All subjects: name on the command line, and function.
-pub const SUBJECTS: [(&str, Subject); 13] = [
+pub const SUBJECTS: [(&str, Subject); 14] = [
     ("elements", elements::section),
     ("smooth", smooth::section),
     ("cut-cells", cut_cells::section),
@@ -60,6 +61,7 @@ pub const SUBJECTS: [(&str, Subject); 13] = [
     ("flow-curves", flow_curves::section),
     ("inertia", inertia::section),
     ("solids", solids::section),
+    ("axisymmetric", axisymmetric::section),
 ];
 
 /// Verifies the subjects with the given names, in the order of [`SUBJECTS`]. `announce` is called

@@ -68,7 +68,7 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
     assert!(energy_error(run.as_ref(), first).abs() < 0.01);
     // Particles stay inside, and their volumes add up to that of the grains.
     let plan = run.plan();
-    let total: f64 = run.particles().volume_of(0) * plan.units.area();
+    let total: f64 = run.particles().volume_of(0) * plan.units.volume();
     assert!((total / 16.0 - 1.0).abs() < 1e-12, "{total}");
     for p in &run.particles().position {
         let [x, y] = plan.si(*p);
@@ -98,7 +98,7 @@ fn the_loss_above_a_gauge_is_counted_to_rounding() {
                 let m = &plan.state.materials[usize::from(p.material[k])];
                 m.name == "grains" && plan.si(p.position[k])[1] >= 3.0
             });
-            held.map(|k| p.volume[k]).sum::<f64>() * plan.units.area()
+            held.map(|k| p.volume[k]).sum::<f64>() * plan.units.volume()
         };
         let first = above(run.as_ref());
         finish(run.as_mut(), |run| {
@@ -385,7 +385,7 @@ fn compressible_particles_change_volume_with_the_flow() {
         let p = run.particles();
         let of = |mark: bool| {
             let own = (0..p.len()).filter(|&k| p.mark.as_ref().unwrap()[k] == mark);
-            own.map(|k| p.volume[k]).sum::<f64>() * run.plan().units.area()
+            own.map(|k| p.volume[k]).sum::<f64>() * run.plan().units.volume()
         };
         [of(true), of(false)]
     };

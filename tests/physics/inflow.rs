@@ -61,7 +61,7 @@ fn inside(run: &dyn Run) -> [f64; 2] {
     let plan = run.plan();
     ["sand", "air"].map(|name| {
         let m = plan.state.materials.iter().position(|m| m.name == name).unwrap();
-        run.particles().volume_of(m) * plan.units.area()
+        run.particles().volume_of(m) * plan.units.volume()
     })
 }
 
@@ -126,7 +126,7 @@ fn the_front_of_a_plug_moves_with_the_inflow() {
         }
         let centre = sum / volume;
         assert!((centre - 0.5 * front).abs() < 1e-12, "{centre} {front}");
-        let usual = 1.0 / 64.0 / 16.0 / plan.units.area();
+        let usual = 1.0 / 64.0 / 16.0 / plan.units.volume();
         assert!(largest < 1.0001 * usual, "{largest} {usual}");
         assert!(run.row().volume_error < 0.2);
     });
@@ -235,7 +235,7 @@ fn a_jet_keeps_its_speed_and_fills_the_cells_that_it_crosses() {
         sum += p.volume[k] * p.position[k][0] * plan.units.length;
         volume += p.volume[k];
     }
-    assert!((volume * plan.units.area() - 0.8 * rate).abs() < 1e-12);
+    assert!((volume * plan.units.volume() - 0.8 * rate).abs() < 1e-12);
     let centre = sum / volume;
     assert!((centre - 0.4).abs() < 0.02, "{centre}");
     assert_eq!(run.count().healed, 0);

@@ -64,7 +64,8 @@ fn vector(r: &Rates) -> Vector6<f64> {
 }
 
 fn rates_of(v: &Vector6<f64>) -> Rates {
-    Rates { d: [v[0], v[1]], trace: v[2], relative_spin: v[3], kappa: [v[4], v[5]] }
+    let (d, kappa) = ([v[0], v[1]], [v[4], v[5]]);
+    Rates { d, trace: v[2], relative_spin: v[3], kappa, ..Rates::default() }
 }
 
 fn stress_vector(law: &PointLaw, v: &Vector6<f64>) -> Vector6<f64> {

@@ -105,7 +105,7 @@ fn particles_leave_only_through_the_slit_and_the_background_takes_their_place() 
     let area = |run: &dyn Run, m: &str| {
         let plan = run.plan();
         let m = plan.state.materials.iter().position(|k| k.name == m).unwrap();
-        run.particles().volume_of(m) * plan.units.area()
+        run.particles().volume_of(m) * plan.units.volume()
     };
     let start = [area(&*run, "fluid"), area(&*run, "air")];
     while !run.is_finished() {

@@ -40,7 +40,7 @@ to_time = 0.3
 fn volume(run: &dyn Run, name: &str) -> f64 {
     let plan = run.plan();
     let m = plan.state.materials.iter().position(|m| m.name == name).unwrap();
-    run.particles().volume_of(m) * plan.units.area()
+    run.particles().volume_of(m) * plan.units.volume()
 }
 
 #[test]

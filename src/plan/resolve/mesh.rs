@@ -7,7 +7,8 @@ use super::walls::Walls;
 use crate::plan::Units;
 use crate::plan::boundary::{SIDES, Side, pieces, place_of};
 use crate::plan::meshing::{Line, Refinement, Sizing};
-use crate::scene::{BoundaryKind, GradingTarget, Scene, SceneError, Scope, WallKind};
+use crate::scene::{BoundaryKind, Geometry, GradingTarget, Scene, SceneError, Scope, WallKind};
+use crate::space::measure::Measure;
 use crate::space::mesh::{Axis, Mesh};
 use crate::space::parts::Solid;
 use crate::space::segment::Segment;
@@ -164,7 +165,10 @@ pub(super) fn mesh(
             ),
         ));
     }
-    let mut mesh = Mesh::new(x, y);
+    let mut mesh = Mesh::new(x, y).with_measure(match scene.domain.geometry {
+        Geometry::Plane => Measure::PLANE,
+        Geometry::Axisymmetric => Measure::RING,
+    });
     for cell in 0..mesh.cells() {
         let [px, py] = mesh.cell_centre(cell).map(|v| v * units.length);
         let covers = |[x, y]: [[f64; 2]; 2]| px > x[0] && px < x[1] && py > y[0] && py < y[1];

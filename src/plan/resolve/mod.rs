@@ -2,6 +2,7 @@
 //! table of the scene.
 
 mod accuracy;
+mod axis;
 mod dye;
 mod flow_curves;
 mod gauges;
@@ -73,6 +74,7 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         }
     }
     let si = SiMatter::new(scene, scope)?;
+    axis::check(scene, x, si.gravity)?;
     let units = scales::choose_units(scene, scope, &si, domain, length)?;
     let mut state = si.matter(&units);
     warnings.extend(si.warnings.iter().cloned());
@@ -84,7 +86,10 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let (gauges, wanted) = gauges::gauges(scene, scope, domain, &supports)?;
     gauges::interest(scene)?;
     let candidates = inflow::Candidates { scene, scope, materials: &si.materials };
-    let sides = sides::sides(scene, scope, domain, candidates)?;
+    let mut sides = sides::sides(scene, scope, domain, candidates)?;
+    if axis::is_axis(scene, x) {
+        axis::hold(&mut sides[0], si.materials.iter().any(|m| m.rotation.is_some()));
+    }
     let size = length / f64::from(scene.accuracy.cells.max(1));
     let sources = sources::sources(candidates, domain, size)?;
     walls.blocks.extend(sources.iter().map(|s| SiBlock {

@@ -4,6 +4,10 @@
 //! ```text
 //! B_qa = integral q d/dx N_a  (and d/dy),   force B' p,   residual B u + C p,   penalty B' W B
 //! ```
+//! Around an axis the divergence has the hoop rate, `B_qa = integral q (dN_a/dx + N_a/x)` for the radial
+//! velocity; times the thickness `2 pi x` the integrands are polynomials, which the points integrate
+//! exactly.
+//!
 //! The discontinuous linear pressure is eliminated cell by cell; see
 //! [`stokes`](crate::solve::stokes). In a cell with a solid of any shape only the constant is unknown;
 //! see [`embedding`](crate::space::embedding).
@@ -11,28 +15,46 @@
 use crate::solve::element::{Matrix, Nodal};
 use crate::space::mesh::Mesh;
 use crate::space::parts::Part;
-use crate::space::shape::{D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, NODES, Table};
+use crate::space::shape::{
+    D_ETA_AT_GAUSS, D_XI_AT_GAUSS, GAUSS_3, GAUSS_3_WEIGHTS, NODES, Table, VALUES_AT_GAUSS,
+};
 
-/// Divergence matrix of a cell for the pressure basis `1, xi, eta`, `integral q d/dx N` and
-/// `integral q d/dy N`: tables of the reference cell and the factors they are multiplied by.
+/// Divergence matrix of a cell for its pressure basis, `integral q d/dx N` and `integral q d/dy N`:
+/// tables of the reference cell and the factors they are multiplied by.
 #[derive(Clone, Copy)]
 pub struct Divergence<'a> {
     x_scale: f64,
     y_scale: f64,
     /// The part of the cell that solids leave free.
     part: Option<&'a Part>,
+    /// The matrix of a cell around an axis, by pressure and component, without the factors.
+    ring: Option<[[[f64; NODES]; 2]; 3]>,
 }
 
-/// Matrices of a cell of size 2 x 2 for `d/dx` and `d/dy`, divided by its area.
+/// Matrices of a cell of size 2 x 2 for `d/dx` and `d/dy`, divided by its area, for `q = 1, xi, eta`.
 static REFERENCE_DIVERGENCE: [[[f64; NODES]; 3]; 2] =
-    [reference_divergence(&D_XI_AT_GAUSS), reference_divergence(&D_ETA_AT_GAUSS)];
+    [reference_divergence(&D_XI_AT_GAUSS, None), reference_divergence(&D_ETA_AT_GAUSS, None)];
 
-const fn reference_divergence(slope: &Table) -> [[f64; NODES]; 3] {
+/// The parts of these matrices that a tilt of one adds, of `xi d/dxi N + N` and of `xi d/deta N`.
+static TILTED_DIVERGENCE: [[[f64; NODES]; 3]; 2] = [
+    reference_divergence(&D_XI_AT_GAUSS, Some(1.0)),
+    reference_divergence(&D_ETA_AT_GAUSS, Some(0.0)),
+];
+
+/// Integrals of `q slope`, or of `q (xi slope + value N)`.
+const fn reference_divergence(slope: &Table, value: Option<f64>) -> [[f64; NODES]; 3] {
     let mut b = [[0.0; NODES]; 3];
     let mut k = 0;
     while k < 81 {
         let (g, a) = (k / 9, k % 9);
-        let weighted = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3] * slope[g][a];
+        let at = match value {
+            None => slope[g][a],
+            Some(value) => {
+                let n = VALUES_AT_GAUSS[g % 3][a % 3] * VALUES_AT_GAUSS[g / 3][a / 3];
+                GAUSS_3[g % 3] * slope[g][a] + value * n
+            }
+        };
+        let weighted = GAUSS_3_WEIGHTS[g % 3] * GAUSS_3_WEIGHTS[g / 3] * at;
         b[0][a] += weighted;
         b[1][a] += GAUSS_3[g % 3] * weighted;
         b[2][a] += GAUSS_3[g / 3] * weighted;
@@ -41,11 +63,32 @@ const fn reference_divergence(slope: &Table) -> [[f64; NODES]; 3] {
     b
 }
 
+/// The matrices of a reference cell with a tilt, for its pressure basis.
+fn tilted(tilt: f64) -> [[[f64; NODES]; 2]; 3] {
+    let mut out: [[[f64; NODES]; 2]; 3] = std::array::from_fn(|q| {
+        std::array::from_fn(|c| {
+            std::array::from_fn(|a| {
+                REFERENCE_DIVERGENCE[c][q][a] + tilt * TILTED_DIVERGENCE[c][q][a]
+            })
+        })
+    });
+    // The second pressure is `xi - tilt/3`.
+    let [constant, linear, _] = &mut out;
+    for (linear, constant) in linear.iter_mut().zip(constant) {
+        for (l, c) in linear.iter_mut().zip(constant) {
+            *l -= tilt / 3.0 * *c;
+        }
+    }
+    out
+}
+
 impl<'a> Divergence<'a> {
     /// Divergence matrix of a cell of a mesh.
     pub fn new(mesh: &'a Mesh, cell: usize) -> Self {
-        let [x_scale, y_scale] = mesh.cell_measure(cell).divergence_scales();
-        Divergence { x_scale, y_scale, part: mesh.part(cell) }
+        let measure = mesh.cell_measure(cell);
+        let [x_scale, y_scale] = measure.divergence_scales();
+        let ring = measure.is_ring().then(|| tilted(measure.tilt()));
+        Divergence { x_scale, y_scale, part: mesh.part(cell), ring }
     }
 
     /// Whether each coefficient of the pressure is an unknown.
@@ -58,6 +101,14 @@ impl<'a> Divergence<'a> {
         if let Some(part) = self.part {
             let [x, y] = &part.divergence[0];
             return [(0..NODES).map(|a| x[a] * u[a][0] + y[a] * u[a][1]).sum(), 0.0, 0.0];
+        }
+        if let Some(ring) = &self.ring {
+            return ring.each_ref().map(|[x, y]| {
+                let along = |v: &[f64; NODES], c: usize| -> f64 {
+                    v.iter().zip(u).map(|(v, u)| v * u[c]).sum()
+                };
+                self.x_scale * along(x, 0) + self.y_scale * along(y, 1)
+            });
         }
         let [x, y] = &REFERENCE_DIVERGENCE;
         let mut sum = [[0.0; 3]; 2];
@@ -88,6 +139,15 @@ impl<'a> Divergence<'a> {
             }
             return;
         }
+        if let Some(ring) = &self.ring {
+            for ([x, y], p) in ring.iter().zip(p) {
+                for a in 0..NODES {
+                    f[a][0] += self.x_scale * x[a] * p;
+                    f[a][1] += self.y_scale * y[a] * p;
+                }
+            }
+            return;
+        }
         let [x, y] = &REFERENCE_DIVERGENCE;
         let (px, py) = (p.map(|p| self.x_scale * p), p.map(|p| self.y_scale * p));
         for a in 0..NODES {
@@ -100,9 +160,13 @@ impl<'a> Divergence<'a> {
     pub fn add_penalty(&self, w: &[f64; 3], k: &mut Matrix) {
         let [x, y] = &REFERENCE_DIVERGENCE;
         for q in 0..3 {
-            let [bx, by] = match self.part {
-                Some(part) => part.divergence[q],
-                None => [x[q].map(|v| v * self.x_scale), y[q].map(|v| v * self.y_scale)],
+            let scaled = |x: &[f64; NODES], y: &[f64; NODES]| {
+                [x.map(|v| v * self.x_scale), y.map(|v| v * self.y_scale)]
+            };
+            let [bx, by] = match (self.part, &self.ring) {
+                (Some(part), _) => part.divergence[q],
+                (None, Some(ring)) => scaled(&ring[q][0], &ring[q][1]),
+                (None, None) => scaled(&x[q], &y[q]),
             };
             for a in 0..NODES {
                 for b in 0..NODES {

@@ -120,8 +120,9 @@ impl Restoring {
             let [a, b] = face.cells.map(|c| c as usize);
             let jump = (mean[b] - mean[a]) * self.direction[face.normal];
             if jump > least {
-                let strength = ahead * g * jump * mesh.face_area(a, face.normal);
-                self.faces.push(CellFace { cell: a, side: 2 * face.normal + 1 });
+                let side = 2 * face.normal + 1;
+                let strength = ahead * g * jump * mesh.face(a, side).area;
+                self.faces.push(CellFace { cell: a, side });
                 self.strength.push(strength);
             }
         }

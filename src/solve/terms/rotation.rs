@@ -66,7 +66,7 @@ impl RotationModes {
                 let excess = p.law.excess_coupling();
                 // An excess of the order of rounding is ignored.
                 if excess > LEAST_PART * p.law.coupling {
-                    let s = PointShape::new(shape, measure.size);
+                    let s = PointShape::new(shape, measure, p.r[0]);
                     let mut spin = [0.0; LOCAL];
                     for a in 0..NODES {
                         spin[a] = -0.5 * s.gy[a];
@@ -147,13 +147,14 @@ impl RotationModes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::space::measure::Measure;
     use crate::space::shape::GAUSS_3X3;
 
     const SIZE: [f64; 2] = [0.7, 1.3];
 
     fn points(weight: impl Fn(usize) -> f64) -> Vec<Point> {
         let point = |(g, p): (usize, &crate::space::shape::GaussPoint)| {
-            let s = PointShape::new(&p.shape, SIZE);
+            let s = PointShape::new(&p.shape, Measure::PLANE.of_cell(SIZE, 0.0), p.r[0]);
             let mut spin = [0.0; LOCAL];
             for a in 0..NODES {
                 spin[a] = -0.5 * s.gy[a];

@@ -25,8 +25,9 @@
 
 use super::{CellFace, FaceTerm, Powers};
 use crate::plan::slip::{SlipFace, WallLaw, tangent};
+use crate::space::measure::FaceMeasure;
 use crate::space::mesh::Mesh;
-use crate::space::shape::{GAUSS_3_WEIGHTS, VALUES_AT_GAUSS, side_normal};
+use crate::space::shape::{GAUSS_3, GAUSS_3_WEIGHTS, VALUES_AT_GAUSS};
 
 /// Smallest share of the resistance that the matrix has where material slides, so that friction alone
 /// can hold a body.
@@ -87,8 +88,8 @@ pub struct SlipFaces {
     faces: Vec<CellFace>,
     /// The same faces with their laws.
     walls: Vec<SlipFace>,
-    /// Area of each face.
-    area: Vec<f64>,
+    /// Measure of each face.
+    area: Vec<FaceMeasure>,
     contacts: Vec<[Contact; POINTS]>,
     /// Those of the last matrices, while a correction is applied.
     before: Vec<[Contact; POINTS]>,
@@ -100,10 +101,16 @@ impl SlipFaces {
     /// Faces without resistance; it follows from [`SlipFaces::evaluate`].
     pub fn new(mesh: &Mesh, walls: Vec<SlipFace>) -> Self {
         let faces = walls.iter().map(|w| CellFace { cell: w.cell, side: w.side }).collect();
-        let area = walls.iter().map(|w| mesh.face_area(w.cell, side_normal(w.side))).collect();
+        let area = walls.iter().map(|w| mesh.face(w.cell, w.side)).collect();
         let contacts = vec![[Contact::default(); POINTS]; walls.len()];
         let friction = walls.iter().any(|w| matches!(w.law, WallLaw::Friction { .. }));
         SlipFaces { faces, walls, area, contacts, before: vec![], friction }
+    }
+
+    /// Weights of the points of a face.
+    fn weights(&self, face: usize) -> [f64; POINTS] {
+        let area = &self.area[face];
+        std::array::from_fn(|k| GAUSS_3_WEIGHTS[k] * area.thickness(GAUSS_3[k]))
     }
 
     /// Number of faces.
@@ -198,20 +205,20 @@ impl FaceTerm for SlipFaces {
         if c != along || d != along {
             return 0.0;
         }
-        let points = self.contacts[face].iter().zip(GAUSS_3_WEIGHTS).zip(VALUES_AT_GAUSS);
+        let points = self.contacts[face].iter().zip(self.weights(face)).zip(VALUES_AT_GAUSS);
         let sum: f64 = points.map(|((c, weight), n)| c.tangent() * weight * n[k] * n[l]).sum();
-        self.area[face] * sum
+        self.area[face].area * sum
     }
 
     fn force(&self, face: usize, _nodes: [usize; 3], u: [[f64; 2]; 3]) -> ([[f64; 2]; 3], Powers) {
         let along = tangent(self.faces[face].side);
         let wall = &self.walls[face].wall;
         let (mut force, mut powers) = ([[0.0; 2]; 3], Powers::default());
-        let points = self.contacts[face].iter().zip(GAUSS_3_WEIGHTS).zip(VALUES_AT_GAUSS);
+        let points = self.contacts[face].iter().zip(self.weights(face)).zip(VALUES_AT_GAUSS);
         for ((contact, weight), n) in points {
             let at = |values: [f64; 3]| -> f64 { n.iter().zip(values).map(|(n, v)| n * v).sum() };
             let [moving, slip] = [at(*wall), at(u.map(|u| u[along])) - at(*wall)];
-            let friction = self.area[face] * weight * contact.resistance * slip;
+            let friction = self.area[face].area * weight * contact.resistance * slip;
             for (force, n) in force.iter_mut().zip(n) {
                 force[along] -= friction * n;
             }
