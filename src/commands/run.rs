@@ -10,7 +10,7 @@ use crate::record::rerun_log::Sink;
 use crate::record::summary::Ending;
 use crate::record::text::duration;
 use crate::results::Member;
-use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash};
+use crate::scene::{Geometry, Quantity, Scene, SceneSource, Scope, scene_hash};
 use crate::session::{
     Budget, Ended, Options, Recording, Safety, Session, tell, wait_for_interrupt, watch_interrupts,
 };
@@ -187,6 +187,7 @@ fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
 /// The text printed at the end of a run.
 fn report(ended: &Ended, profile: bool) -> String {
     let s = &ended.summary;
+    let round = s.geometry == Geometry::Axisymmetric;
     let ending = match s.ending {
         Ending::Finished => "finished",
         Ending::StepLimit => "stopped at the step limit",
@@ -202,17 +203,24 @@ fn report(ended: &Ended, profile: bool) -> String {
         duration(ended.wall)
     );
     for (name, g) in &s.gauges {
-        out += &format!("  gauge {name}: volume {:.4} m2, rate {:.4e} m2/s", g.volume, g.rate);
+        let (volume, rate) = if round { ("m3", "m3/s") } else { ("m2", "m2/s") };
+        out +=
+            &format!("  gauge {name}: volume {:.4} {volume}, rate {:.4e} {rate}", g.volume, g.rate);
         if g.refilled != 0.0 {
-            out += &format!(", and {:.1e} m2 carried across by refilling empty cells", g.refilled);
+            out += &format!(
+                ", and {:.1e} {volume} carried across by refilling empty cells",
+                g.refilled
+            );
         }
         out.push('\n');
     }
     for (name, f) in &s.forces {
-        out += &format!(
-            "  gauge {name}: force ({:.4e}, {:.4e}) N/m, torque {:.4e} N\n",
-            f.x, f.y, f.torque
-        );
+        out += &if round {
+            format!("  gauge {name}: force {:.4e} N along the axis\n", f.y)
+        } else {
+            let [x, y, torque] = [f.x, f.y, f.torque];
+            format!("  gauge {name}: force ({x:.4e}, {y:.4e}) N/m, torque {torque:.4e} N\n")
+        };
     }
     if let Some(p) = &s.purchase {
         out += &chosen::receipt_text(p);

@@ -15,6 +15,7 @@ pub use tolerance::{Tolerance, Verdict};
 pub use view::{plots, record};
 
 use crate::results::{Kind, Member, ResultsError, later, table};
+use crate::scene::Geometry;
 use serde::Serialize;
 
 /// Version of the JSON format of a comparison.
@@ -158,6 +159,7 @@ fn short(value: f64) -> String {
 /// Values of all runs at a common time.
 fn values(members: &[Member], time: f64, notes: &mut Vec<String>) -> Vec<Value> {
     let at_time: Vec<_> = members.iter().map(|m| m.values_at(time)).collect();
+    let geometry = members.first().map_or(Geometry::Plane, Member::geometry);
     for (member, values) in members.iter().zip(&at_time) {
         if values.is_none() {
             notes.push(format!(
@@ -182,7 +184,7 @@ fn values(members: &[Member], time: f64, notes: &mut Vec<String>) -> Vec<Value> 
             .collect();
         let first = values.first().copied().flatten();
         let relative = values.iter().map(|&v| change(first?, v?)).collect();
-        Value { key: key.to_owned(), unit: table::unit(key), values, relative }
+        Value { key: key.to_owned(), unit: table::unit(key, geometry), values, relative }
     });
     list.collect()
 }

@@ -5,6 +5,7 @@ use crate::frame::RunInfo;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec, line_plot, panels_plot};
 use crate::record::rerun_log::{Difference, Finished, RecordError, RecordedRun, SideBySide, Sink};
 use crate::results::{Kind, Member, later, table};
+use crate::scene::Geometry;
 use std::path::{Path, PathBuf};
 
 /// Name of a figure; title, column and axis name of each of its panels.
@@ -17,6 +18,7 @@ pub fn plots(stem: &Path, members: &[Member]) -> Result<Vec<PathBuf>, PlotError>
         return Ok(vec![]);
     }
     let mut written = vec![];
+    let geometry = members.first().map_or(Geometry::Plane, Member::geometry);
     for (name, panels) in figures(members) {
         let specs: Vec<PlotSpec> = panels
             .into_iter()
@@ -24,8 +26,8 @@ pub fn plots(stem: &Path, members: &[Member]) -> Result<Vec<PathBuf>, PlotError>
                 title,
                 x: Axis::new("time", "s"),
                 y: match column.ends_with("_error") {
-                    true => Axis::new(axis, table::unit(&column)).log(),
-                    false => Axis::new(axis, table::unit(&column)),
+                    true => Axis::new(axis, table::unit(&column, geometry)).log(),
+                    false => Axis::new(axis, table::unit(&column, geometry)),
                 },
                 curves: tables()
                     .filter_map(|(member, table)| {

@@ -6,6 +6,7 @@ use super::{BASE_STYLE, CANVAS, DRAWING, Description, STYLE, VIEW};
 use crate::record::replace::{self, Kind, ReplaceError};
 use crate::record::text::escape;
 use crate::results::Member;
+use crate::scene::Geometry;
 use crate::sim::row;
 use crate::words::count;
 use base64::Engine;
@@ -84,8 +85,9 @@ fn page(members: &[Member], detail: Detail, command: &str) -> Result<String, Rep
         runs.push(run);
         notes.extend(note);
     }
+    let geometry = members.first().map_or(Geometry::Plane, Member::geometry);
     let columns = runs.iter().filter_map(|r| r.series.as_ref()).flat_map(|s| &s.columns);
-    let units = columns.filter_map(|c| Some((c.clone(), row::find(c)?.unit)));
+    let units = columns.filter_map(|c| Some((c.clone(), row::find(c)?.unit_in(geometry))));
     let units = units.filter(|(_, unit)| !unit.is_empty()).collect();
     let several = members.len() > 1;
     let mut again: Vec<String> = members

@@ -135,9 +135,9 @@ fn plots(plan: &Plan) -> Vec<Plot> {
         of_panel.map(|p| Series::new(p.path.clone(), p.curve.clone())).collect()
     };
     let plot = |panel: Panel| {
-        let (title, log10) = panel.heading();
+        let (title, log10) = panel.heading(plan.scene.domain.geometry);
         let series = curves(panel);
-        (!series.is_empty()).then(|| Plot { title: title.into(), log10, series })
+        (!series.is_empty()).then(|| Plot { title, log10, series })
     };
     Panel::ALL.into_iter().filter_map(plot).collect()
 }

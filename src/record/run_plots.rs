@@ -14,6 +14,7 @@ pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), Plot
         marks: false,
     };
     let title = &plan.scene.name;
+    let unit = |in_plane| plan.scene.domain.geometry.unit(in_plane);
     let gauges = &plan.gauges;
     if !gauges.is_empty() {
         let of = |value: &dyn Fn(&Row, usize) -> f64| -> Vec<Curve> {
@@ -25,13 +26,13 @@ pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), Plot
                 PlotSpec {
                     title: format!("{title}: outflow volume"),
                     x: time(),
-                    y: Axis::new("outflow volume", "m²"),
+                    y: Axis::new("outflow volume", unit("m²")),
                     curves: of(&|r, k| r.gauges[k].volume),
                 },
                 PlotSpec {
                     title: "outflow rate".into(),
                     x: time(),
-                    y: Axis::new("outflow rate", "m²/s"),
+                    y: Axis::new("outflow rate", unit("m²/s")),
                     curves: of(&|r, k| r.gauges[k].rate),
                 },
             ],
@@ -48,13 +49,13 @@ pub fn plots_of_run(folder: &Path, plan: &Plan, rows: &[Row]) -> Result<(), Plot
                 PlotSpec {
                     title: format!("{title}: force along x"),
                     x: time(),
-                    y: Axis::new("force along x", "N/m"),
+                    y: Axis::new("force along x", unit("N/m")),
                     curves: of(&|r, k| r.forces[k].x),
                 },
                 PlotSpec {
                     title: "force along y".into(),
                     x: time(),
-                    y: Axis::new("force along y", "N/m"),
+                    y: Axis::new("force along y", unit("N/m")),
                     curves: of(&|r, k| r.forces[k].y),
                 },
             ],

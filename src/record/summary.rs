@@ -2,7 +2,7 @@
 
 use super::logger::Traffic;
 use super::replace::{self, Kind};
-use crate::scene::{Quadrature, scene_hash};
+use crate::scene::{Geometry, Quadrature, scene_hash};
 use crate::sim::Run;
 use crate::sim::criteria::{ACCURATE_ENERGY, ENERGY_STEPS};
 use crate::sim::phases::Phases;
@@ -39,6 +39,8 @@ pub struct Summary {
     pub version: &'static str,
     /// Name of the scene.
     pub scene: String,
+    /// Geometry of the scene: round flows have volumes in m3, forces in N, powers in W.
+    pub geometry: Geometry,
     /// SHA-256 of the resolved scene, hexadecimal.
     pub scene_hash: String,
     /// SHA-256 of the bits of the final particle state, hexadecimal.
@@ -279,6 +281,7 @@ impl Summary {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
             scene: plan.scene.name.clone(),
+            geometry: plan.scene.domain.geometry,
             scene_hash: scene_hash(&plan.scene),
             state_hash: run.state_hash(),
             folder,

@@ -7,7 +7,7 @@ use crate::frame::RunInfo;
 use crate::record::folder::FILES;
 use crate::record::info::run_info;
 use crate::record::rerun_log::Recorded;
-use crate::scene::{self, SceneSource, scene_hash};
+use crate::scene::{self, Geometry, SceneSource, scene_hash};
 use indexmap::IndexMap;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -46,6 +46,20 @@ pub struct Member {
     pub notes: Vec<String>,
     summary: Option<Summary>,
     scene: Option<(String, String)>,
+}
+
+impl Member {
+    /// Geometry of the scene, on which units depend; the plane if the scene is unknown.
+    pub fn geometry(&self) -> Geometry {
+        let parsed =
+            self.scene_toml.as_ref().and_then(|t| t.parse::<toml_edit::DocumentMut>().ok());
+        let written =
+            parsed.and_then(|t| Some(t.get("domain")?.get("geometry")?.as_str()?.to_owned()));
+        match written.as_deref() {
+            Some("axisymmetric") => Geometry::Axisymmetric,
+            _ => Geometry::Plane,
+        }
+    }
 }
 
 /// Reads runs and gives them different names.

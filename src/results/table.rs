@@ -1,6 +1,7 @@
 //! This module reads the series of a run: columns of values against time.
 
 use crate::record::rerun_log::Sample;
+use crate::scene::Geometry;
 use crate::sim::row::{COLUMNS, Column, PER_FORCE, PER_GAUGE, PER_MATERIAL, Rank, find};
 use crate::words::count;
 use indexmap::IndexMap;
@@ -149,11 +150,11 @@ pub fn has_curve(key: &str) -> bool {
     matches!(find(key).map(|c| c.rank), Some(Rank::Compared(_)))
 }
 
-/// Unit of a column; empty for pure numbers.
-pub fn unit(key: &str) -> &'static str {
+/// Unit of a column of runs with a geometry; empty for pure numbers.
+pub fn unit(key: &str, geometry: Geometry) -> &'static str {
     match key {
         "end" | SECONDS => "s",
-        _ => find(key).map_or("", |c| c.unit),
+        _ => find(key).map_or("", |c| c.unit_in(geometry)),
     }
 }
 

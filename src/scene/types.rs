@@ -153,6 +153,22 @@ pub enum Geometry {
     Axisymmetric,
 }
 
+impl Geometry {
+    /// The unit of a quantity of a run, from that in the plane, where volumes, forces, powers and energies
+    /// are per metre of depth.
+    pub fn unit(self, in_plane: &'static str) -> &'static str {
+        match (self, in_plane) {
+            (Geometry::Plane, unit) => unit,
+            (_, "m²") => "m³",
+            (_, "m²/s") => "m³/s",
+            (_, "N/m") => "N",
+            (_, "W/m") => "W",
+            (_, "J/m") => "J",
+            (_, unit) => unit,
+        }
+    }
+}
+
 fn is_plane(geometry: &Geometry) -> bool {
     *geometry == Geometry::Plane
 }

@@ -10,6 +10,7 @@ use super::sampling::{Filling, Sample, filling, samples};
 use crate::plan::{InitialDirector, Mark, Plan};
 use crate::scene::FieldFn;
 use crate::space::count::Count;
+use crate::space::measure::CellMeasure;
 use crate::space::particles::Particles;
 use crate::space::population::Population;
 use rand::Rng;
@@ -19,6 +20,10 @@ use rand_pcg::Pcg64;
 const LEAST_SHARE: f64 = 1e-8;
 /// Smallest distance of shifted particles from the sides of their cell, in half cells.
 const INSET: f64 = 1e-3;
+/// Largest number of shifts of the particles of a material around an axis, and distance of their centroid
+/// from that of their part, in half cells, at which they end.
+const SHIFTS: u32 = 40;
+const CENTRED: f64 = 1e-15;
 
 /// Error: a point of the domain lies in no region, and there is no background material.
 #[derive(Debug, thiserror::Error)]
@@ -65,21 +70,19 @@ pub fn particles(plan: &Plan) -> Result<(Particles, Vec<usize>), Unfilled> {
             let r = mesh.to_reference(cell, position);
             members.push(Member { r, share: 1.0 / places.len() as f64, material, filling });
         }
+        let measure = mesh.cell_measure(cell);
+        make_rings(measure, &mut members);
         // Next to a solid, each particle is of the material at its place.
         if mesh.part(cell).is_none() {
             let samples = samples(plan, cell);
             divide(plan, cell, &samples, &mut members);
         }
-        let measure = mesh.cell_measure(cell);
-        // Sections become rings, whose volumes add up to that of the cell.
-        let outwards: f64 = members.iter().map(|m| m.share * measure.tilt() * m.r[0]).sum();
         let (i, j) = mesh.cell_ij(cell);
         let angles = spread_angles(members.len(), [i, j], start, &mut random);
         let first = out.len();
         for (member, angle) in members.iter().zip(angles) {
             let position = mesh.from_reference(cell, member.r);
-            let share = measure.share(member.share, member.r[0]) / (1.0 + outwards);
-            out.push(position, measure.of_share(share), member.material);
+            out.push(position, measure.of_share(member.share), member.material);
             let last = out.len() - 1;
             let si = plan.si(position);
             member.filling.iter().for_each(|&f| empty[f] = false);
@@ -131,7 +134,7 @@ fn places(plan: &Plan) -> Particles {
 struct Member {
     /// Reference coordinates.
     r: [f64; 2],
-    /// Fraction of the section of the cell.
+    /// Fraction of the volume of the cell.
     share: f64,
     material: u8,
     filling: Filling,
@@ -144,14 +147,15 @@ fn material(plan: &Plan, filling: Filling) -> Option<u8> {
 /// Sets volumes and positions so that the particles of each material represent its part of a cell.
 fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member>) {
     let materials = plan.state.materials.len();
-    // Area fraction and first moments of each material.
+    let measure = plan.mesh.whole_measure(cell);
+    // Volume fraction and first moments of each material.
     let mut parts = vec![[0.0; 3]; materials];
     for s in samples {
         if let Some(m) = material(plan, s.filling) {
-            let part = &mut parts[m as usize];
-            part[0] += s.share;
-            part[1] += s.share * s.r[0];
-            part[2] += s.share * s.r[1];
+            let (part, share) = (&mut parts[m as usize], measure.share(s.share, s.r[0]));
+            part[0] += share;
+            part[1] += share * s.r[0];
+            part[2] += share * s.r[1];
         }
     }
     let total: f64 = parts.iter().map(|p| p[0]).filter(|&s| s > LEAST_SHARE).sum();
@@ -169,19 +173,36 @@ fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member
             members.extend(lone(plan, cell, samples, (m as u8, centroid, share)));
             continue;
         }
-        let count = own.len() as f64;
-        own.iter_mut().for_each(|p| p.share = share / count);
-        for c in 0..2 {
-            let mean = own.iter().map(|p| p.r[c]).sum::<f64>() / count;
-            // Contract the particles if the shift alone would move some out of the cell.
-            let edge = centroid[c].abs().max(1.0 - INSET);
-            let room = |p: &&mut Member| {
-                let from_mean = p.r[c] - mean;
-                (from_mean.signum() * edge - centroid[c]) / from_mean
-            };
-            let scale = own.iter().map(room).filter(|s| s.is_finite()).fold(1.0, f64::min);
-            own.iter_mut().for_each(|p| p.r[c] = centroid[c] + scale * (p.r[c] - mean));
+        // Around an axis a shift changes the volumes of the rings, so it is repeated.
+        let mut off = [f64::INFINITY; 2];
+        for _ in 0..SHIFTS {
+            if off.iter().all(|o| o.abs() < CENTRED) {
+                break;
+            }
+            let sum: f64 = own.iter().map(|p| measure.thickness(p.r[0])).sum();
+            own.iter_mut().for_each(|p| p.share = measure.share(share, p.r[0]) / sum);
+            for c in 0..2 {
+                let weighted = own.iter().map(|p| measure.share(p.r[c], p.r[0]));
+                let mean = weighted.sum::<f64>() / sum;
+                // Contract the particles if the shift alone would move some out of the cell.
+                let edge = centroid[c].abs().max(1.0 - INSET);
+                let room = |p: &&mut Member| {
+                    let from_mean = p.r[c] - mean;
+                    (from_mean.signum() * edge - centroid[c]) / from_mean
+                };
+                let scale = own.iter().map(room).filter(|s| s.is_finite()).fold(1.0, f64::min);
+                off[c] = if measure.is_ring() { centroid[c] - mean } else { 0.0 };
+                own.iter_mut().for_each(|p| p.r[c] = centroid[c] + scale * (p.r[c] - mean));
+            }
         }
+    }
+}
+
+/// Gives the members of a cell of one material, which have equal sections, the volumes of their rings.
+fn make_rings(measure: CellMeasure, members: &mut [Member]) {
+    let outwards: f64 = members.iter().map(|m| m.share * measure.tilt() * m.r[0]).sum();
+    for member in members {
+        member.share = measure.share(member.share, member.r[0]) / (1.0 + outwards);
     }
 }
 

@@ -10,6 +10,7 @@ use super::clock::Limiter;
 use super::phases::Phases;
 use crate::plan::material::Material;
 use crate::plan::{Plan, Units};
+use crate::scene::Geometry;
 use crate::solve::report::Report;
 use crate::space::count::Count;
 use crate::space::particles::Particles;
@@ -90,16 +91,17 @@ impl Panel {
     ];
 
     /// Heading of the panel, and whether its axis is logarithmic.
-    pub fn heading(self) -> (&'static str, bool) {
+    pub fn heading(self, geometry: Geometry) -> (String, bool) {
+        let of = |what: &str, unit| (format!("{what} ({})", geometry.unit(unit)), false);
         match self {
-            Panel::OutflowVolume => ("Outflow volume (m²)", false),
-            Panel::OutflowRate => ("Outflow rate (m²/s)", false),
-            Panel::Force => ("Force (N/m)", false),
-            Panel::Alignment => ("Mean alignment |n_x|", false),
-            Panel::Power => ("Power (W/m)", false),
-            Panel::Balances => ("Balances (log10)", true),
-            Panel::Seconds => ("Seconds per step", false),
-            Panel::TimeStep => ("Time step (log10 s)", true),
+            Panel::OutflowVolume => of("Outflow volume", "m²"),
+            Panel::OutflowRate => of("Outflow rate", "m²/s"),
+            Panel::Force => of("Force", "N/m"),
+            Panel::Alignment => ("Mean alignment |n_x|".into(), false),
+            Panel::Power => of("Power", "W/m"),
+            Panel::Balances => ("Balances (log10)".into(), true),
+            Panel::Seconds => ("Seconds per step".into(), false),
+            Panel::TimeStep => ("Time step (log10 s)".into(), true),
         }
     }
 }
@@ -606,6 +608,11 @@ impl Column {
 }
 
 impl Column {
+    /// Unit of the values of a run.
+    pub fn unit_in(&self, geometry: Geometry) -> &'static str {
+        geometry.unit(self.unit)
+    }
+
     /// The value of a row as a number, for columns of the whole run; NaN if it is not a number.
     pub fn number(&self, row: &Row) -> f64 {
         (self.access.number)(row, 0)
