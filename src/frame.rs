@@ -219,6 +219,8 @@ pub struct RunInfo {
     pub recording_id: String,
     /// The domain of the simulation (m).
     pub domain: Rect,
+    /// Whether the flow is round: x is the distance from the axis.
+    pub round: bool,
     /// Walls, sides of blocks and sides of the domain.
     pub walls: Vec<Outline>,
     /// Gauges: lines through which the flow is measured.

@@ -465,12 +465,14 @@ function renderWarnings() {
 // --- curves ---
 
 const chosen = [null, null, null]; // columns chosen by the user; null for the default of the scene
-const WORDS = { dt: "time step (s)", power_error: "power balance", volume_error: "volume error", max_speed: "largest speed (m/s)", dissipation: "dissipation (W/m)" };
+const WORDS = { dt: "time step (s)", power_error: "power balance", volume_error: "volume error", max_speed: "largest speed (m/s)" };
 
 function title(column) {
   if (WORDS[column]) return WORDS[column];
-  if (column.endsWith(" rate")) return `${column} (m²/s)`;
-  if (column.endsWith(" volume")) return `${column} (m²)`;
+  const round = state && state.run && state.run.round;
+  if (column === "dissipation") return `dissipation (${round ? "W" : "W/m"})`;
+  if (column.endsWith(" rate")) return `${column} (${round ? "m³" : "m²"}/s)`;
+  if (column.endsWith(" volume")) return `${column} (${round ? "m³" : "m²"})`;
   return column;
 }
 

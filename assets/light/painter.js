@@ -59,10 +59,15 @@ function ticks(low, high, count) {
   return list;
 }
 
+// The corners of what is shown: the domain, and its mirror image if x is the distance from an axis.
+function extent({ domain: [[x0, y0], [x1, y1]], round }) {
+  return [[round ? -x1 : x0, y0], [x1, y1]];
+}
+
 // The place of a picture in a rectangle of the surface: {box, scale, X, Y, x, y}; X and Y map metres
 // to pixels, x and y back.
 function layout(description, look, [left, top, width, height], unit) {
-  const [[x0, y0], [x1, y1]] = description.domain;
+  const [[x0, y0], [x1, y1]] = extent(description);
   const box = [left + 52 * unit, top + 30 * unit, Math.max(width - 64 * unit, 10), Math.max(height - 100 * unit, 10)];
   const whole = Math.min(box[2] / (x1 - x0), box[3] / (y1 - y0));
   const scale = whole * look.zoom;
@@ -93,13 +98,15 @@ function shade(value, [low, high]) {
   return Math.max(0, Math.min(255, Math.round((255 * (value - low)) / (high - low))));
 }
 
-function fieldImage(field, description, look) {
+// The colours of a field, or of its mirror image, in which rotations have the other sign.
+function fieldImage(field, description, look, mirrored) {
   const { ends, palette } = scaleOf(field, description, look);
   const { nx, ny, values } = field;
+  const sign = mirrored && field.name === "rotation" ? -1 : 1;
   const rgba = new Uint8Array(4 * nx * ny);
   for (let j = 0; j < ny; j++) {
     for (let i = 0; i < nx; i++) {
-      const value = values[(ny - 1 - j) * nx + i];
+      const value = sign * values[(ny - 1 - j) * nx + (mirrored ? nx - 1 - i : i)];
       if (value !== value) continue;
       const [c, to] = [3 * shade(value, ends), 4 * (j * nx + i)];
       rgba[to] = palette[c]; rgba[to + 1] = palette[c + 1]; rgba[to + 2] = palette[c + 2]; rgba[to + 3] = 255;
@@ -116,20 +123,26 @@ function paint(surface, description, frame, moment, look, rect, unit) {
   const { X, Y, scale } = place;
   const [fx, fy, fw, fh] = place.frame;
   const [[x0, y0], [x1, y1]] = description.domain;
+  const sides = description.round ? [X, (x) => X(-x)] : [X];
   surface.fill(...rect, theme.ground);
   surface.fill(fx, fy, fw, fh, theme.paper);
   surface.clip(fx, fy, fw, fh);
   const behind = frame.fields[look.field];
-  if (behind) surface.image(fieldImage(behind, description, look), behind.nx, behind.ny, X(x0), Y(y1), scale * (x1 - x0), scale * (y1 - y0));
-  if (look.particles) paintParticles(surface, description, frame, look, place);
-  if (look.dye) for (const line of frame.lines) surface.line(map(line, X, Y), 1 * unit, theme.dye);
-  if (look.strokes && frame.strokes.length) surface.segments(map(frame.strokes, X, Y), 1.2 * unit, theme.dye);
+  for (const [k, side] of sides.entries()) {
+    const mirrored = k === 1;
+    if (behind) surface.image(fieldImage(behind, description, look, mirrored), behind.nx, behind.ny, side(mirrored ? x1 : x0), Y(y1), scale * (x1 - x0), scale * (y1 - y0));
+    if (look.particles) paintParticles(surface, description, frame, look, place, mirrored);
+    if (look.dye) for (const line of frame.lines) surface.line(map(line, side, Y), 1 * unit, theme.dye);
+    if (look.strokes && frame.strokes.length) surface.segments(map(frame.strokes, side, Y), 1.2 * unit, theme.dye);
+  }
   surface.unclip();
   surface.clip(fx - 2 * unit, fy - 2 * unit, fw + 4 * unit, fh + 4 * unit);
-  for (const wall of description.walls) surface.line(map(wall.points.flat(), X, Y), 2.5 * unit, theme.wall);
-  if (look.gauges) for (const gauge of description.gauges) surface.line(map(gauge.points.flat(), X, Y), 3 * unit, theme.gauge);
+  for (const side of sides) {
+    for (const wall of description.walls) surface.line(map(wall.points.flat(), side, Y), 2.5 * unit, theme.wall);
+    if (look.gauges) for (const gauge of description.gauges) surface.line(map(gauge.points.flat(), side, Y), 3 * unit, theme.gauge);
+  }
   surface.unclip();
-  paintAxes(surface, place, theme, unit);
+  paintAxes(surface, place, description, theme, unit);
   // Title and key are as wide as the picture, or wider if it is narrow.
   const beside = { left: fx, right: fw > 260 * unit ? fx + fw : rect[0] + rect[2] - 12 * unit, top: rect[1], bottom: rect[1] + rect[3] };
   paintHead(surface, description, moment, beside, theme, unit);
@@ -146,7 +159,7 @@ function map(points, X, Y) {
   return out;
 }
 
-function paintParticles(surface, description, frame, look, { X, Y, scale }) {
+function paintParticles(surface, description, frame, look, { X, Y, scale }, mirrored) {
   const n = frame.count;
   const [x, y, r, paint] = [new Float32Array(n), new Float32Array(n), new Float32Array(n), new Uint8Array(n)];
   const field = frame.fields[look.colour];
@@ -156,8 +169,9 @@ function paintParticles(surface, description, frame, look, { X, Y, scale }) {
     surface.discs(x, y, r, paint, colours);
   };
   const [ox, oy] = [X(0), Y(0)];
+  const across = mirrored ? -scale : scale;
   for (let k = 0; k < n; k++) {
-    x[k] = ox + scale * frame.x[k];
+    x[k] = ox + across * frame.x[k];
     y[k] = oy - scale * frame.y[k];
     r[k] = scale * frame.radius[k];
   }
@@ -166,15 +180,16 @@ function paintParticles(surface, description, frame, look, { X, Y, scale }) {
     return;
   }
   const { ends, palette } = scaleOf(field, description, look);
+  const sign = mirrored && field.name === "rotation" ? -1 : 1;
   for (let k = 0; k < n; k++) {
     // Particles at the edge of a field have a value.
-    const value = fieldAt(field, description, frame.x[k], frame.y[k], 1e-3);
+    const value = sign * fieldAt(field, description, frame.x[k], frame.y[k], 1e-3);
     paint[k] = value === value ? shade(value, ends) : 128;
   }
   draw(palette, paint);
 }
 
-function paintAxes(surface, place, theme, unit) {
+function paintAxes(surface, place, { round }, theme, unit) {
   const [fx, fy, fw, fh] = place.frame;
   const size = 11 * unit;
   const border = [fx, fy, fx + fw, fy, fx + fw, fy + fh, fx, fy + fh, fx, fy];
@@ -184,14 +199,14 @@ function paintAxes(surface, place, theme, unit) {
   const marks = [];
   for (const v of across) {
     marks.push(place.X(v), fy + fh, place.X(v), fy + fh + 4 * unit);
-    surface.text(short(v, 4), place.X(v), fy + fh + 15 * unit, size, theme.soft, "middle");
+    surface.text(short(round ? Math.abs(v) : v, 4), place.X(v), fy + fh + 15 * unit, size, theme.soft, "middle");
   }
   for (const v of up) {
     marks.push(fx - 4 * unit, place.Y(v), fx, place.Y(v));
     surface.text(short(v, 4), fx - 7 * unit, place.Y(v) + 4 * unit, size, theme.soft, "end");
   }
   surface.segments(new Float32Array(marks), unit, theme.soft);
-  surface.text("x (m)", fx + 0.5 * fw, fy + fh + 29 * unit, size, theme.soft, "middle");
+  surface.text(round ? "radius (m)" : "x (m)", fx + 0.5 * fw, fy + fh + 29 * unit, size, theme.soft, "middle");
   surface.text("y (m)", fx - 7 * unit, fy - 8 * unit, size, theme.soft, "end");
 }
 
@@ -242,7 +257,8 @@ function paintKey(surface, description, frame, look, { left, right, bottom }, pl
 }
 
 // Columns and rows of n pictures in which the pictures are largest.
-function grid(n, w, h, { domain: [[x0, y0], [x1, y1]] }) {
+function grid(n, w, h, description) {
+  const [[x0, y0], [x1, y1]] = extent(description);
   let best = [1, n, 0];
   for (let columns = 1; columns <= n; columns++) {
     const rows = Math.ceil(n / columns);

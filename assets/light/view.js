@@ -284,14 +284,17 @@ class LightView {
     const tip = this.tip;
     tip.hidden = true;
     if (!panel) return;
-    const [x, y] = [panel.place.x(X), panel.place.y(Y)];
+    const { round } = panel.description;
+    const [shown, y] = [panel.place.x(X), panel.place.y(Y)];
+    const x = round ? Math.abs(shown) : shown;
     const [[x0, y0], [x1, y1]] = panel.description.domain;
     if (x < x0 || x > x1 || y < y0 || y > y1) return;
-    const lines = [`x ${short(x, 4)} m, y ${short(y, 4)} m`];
+    const lines = [`${round ? "radius" : "x"} ${short(x, 4)} m, y ${short(y, 4)} m`];
     const near = nearest(panel.frame, x, y);
     if (near >= 0) lines.push(panel.description.materials[panel.frame.material[near]].name);
     for (const field of Object.values(panel.frame.fields)) {
-      const value = fieldAt(field, panel.description, x, y);
+      const sign = shown < 0 && round && field.name === "rotation" ? -1 : 1;
+      const value = sign * fieldAt(field, panel.description, x, y);
       if (value === value) lines.push(`${inWords(field.name)} ${short(value)} ${field.unit}`);
     }
     tip.replaceChildren(...lines.map((line) => make("div", {}, line)));
@@ -347,7 +350,10 @@ class LightView {
   }
 }
 
-function middle({ domain: [[x0, y0], [x1, y1]] }) { return [0.5 * (x0 + x1), 0.5 * (y0 + y1)]; }
+function middle(description) {
+  const [[x0, y0], [x1, y1]] = extent(description);
+  return [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
+}
 
 // The particle that covers a point; -1 if there is none.
 function nearest(frame, x, y) {

@@ -212,6 +212,8 @@ pub struct RunState {
     pub particles: usize,
     /// Number of cells along x and y.
     pub cells: [usize; 2],
+    /// Whether the flow is round: volumes are in m3, powers in W.
+    pub round: bool,
     /// Number of unknowns: velocity, rotation and pressure.
     pub unknowns: usize,
     /// Diagnostics with bounds.

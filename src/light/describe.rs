@@ -11,6 +11,8 @@ pub struct Description {
     pub name: String,
     /// Lower left and upper right corner of the domain.
     domain: [[f32; 2]; 2],
+    /// Whether x is the distance from the axis; pictures then show the mirror image too.
+    round: bool,
     walls: Vec<Line>,
     gauges: Vec<Line>,
     materials: Vec<Material>,
@@ -54,6 +56,7 @@ impl Description {
         Description {
             name: info.name.clone(),
             domain: [info.domain.min, info.domain.max],
+            round: info.round,
             walls: lines(&info.walls),
             gauges: lines(&info.gauges),
             materials: info
@@ -67,10 +70,11 @@ impl Description {
         }
     }
 
-    /// Height over width of the domain.
+    /// Height over width of a picture.
     pub fn shape(&self) -> f64 {
         let [low, high] = self.domain;
-        f64::from((high[1] - low[1]) / (high[0] - low[0]))
+        let width = if self.round { 2.0 * high[0] } else { high[0] - low[0] };
+        f64::from((high[1] - low[1]) / width)
     }
 
     /// Distance of two neighbouring packed positions (m), along the longer side.

@@ -5,7 +5,7 @@ use crate::frame::{
 };
 use crate::plan::Plan;
 use crate::plan::boundary::SIDES;
-use crate::scene::{Block, ColourBy, FieldName, SolidShape, scene_hash, to_toml};
+use crate::scene::{Block, ColourBy, FieldName, Geometry, SolidShape, scene_hash, to_toml};
 use crate::sim::row::{Panel, Place, Row, places};
 use crate::space::segment::Segment;
 
@@ -64,6 +64,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         name: name.into(),
         recording_id: format!("{name}-{}", &hash[..hash.len().min(12)]),
         domain,
+        round: plan.scene.domain.geometry == Geometry::Axisymmetric,
         walls,
         gauges: plan
             .gauges

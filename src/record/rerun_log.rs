@@ -9,12 +9,14 @@
 //! | `world/fields/<field>/{image,bar,ticks,isolines}` | one field |
 //! | `world/fields/<field>/values` | its values, on half as many samples per side |
 //! | the path of each scalar, and `<path>/log10` | the plots |
+//! | `round/{first,second,dye,walls,outlines}` | a round flow in three dimensions, see `round.rs` |
 //! | `scene`, `plan`, `log` | input, solved effects, warnings |
 //!
 //! Timelines are `sim_time`, `step` and `wall_time`. Positions are in metres with y up. The viewer
 //! draws y down, so a static transform mirrors `world`, and views have its parent as their origin.
 
 mod pictures;
+mod round;
 mod world;
 
 mod blueprint;
@@ -208,6 +210,12 @@ pub struct RerunLog {
     scales: HashMap<EntityPath, ColourScale>,
     /// Entities of the isolines drawn last; they are cleared when they are no longer drawn.
     isolines: HashSet<EntityPath>,
+    /// Whether the flow is round, so that there is a view in three dimensions.
+    round: bool,
+    /// Whether classes or radii changed with the last picture.
+    round_changed: bool,
+    /// Number of dyed lines that were swept last.
+    round_lines: usize,
     pictures: u64,
 }
 
@@ -264,6 +272,9 @@ impl RerunLog {
 
     fn constant(&mut self, info: &RunInfo) -> Result<(), RecordError> {
         self.world(info)?;
+        if info.round {
+            self.round_world(info)?;
+        }
         self.texts(info)?;
         self.curves(info)
     }
@@ -294,6 +305,9 @@ impl RerunLog {
             colored: false,
             scales: HashMap::new(),
             isolines: HashSet::new(),
+            round: info.round,
+            round_changed: true,
+            round_lines: 0,
             pictures: 0,
         }
     }

@@ -159,6 +159,10 @@ impl<const D: usize> Simulation<D> {
                     sum.torque += force * plan.units.length * r[D - 1];
                 }
             }
+            if mesh.measure().is_ring() {
+                // Around the axis all other forces and torques cancel.
+                sum = ForceRow { y: sum.y, ..ForceRow::default() };
+            }
             sum
         };
         plan.forces.iter().map(of).collect()

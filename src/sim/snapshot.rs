@@ -63,21 +63,22 @@ fn particles(plan: &Plan, all: &Particles) -> (ParticleSnapshot, Vec<usize>) {
         Some(m) if m[p] => marked,
         _ => u16::from(all.material[p]),
     };
+    let section = |p: usize| plan.mesh.section(all.volume[p], all.position[p]);
     let position = |&p: &usize| plan.si(all.position[p]).map(|c| c as f32);
     let picture = ParticleSnapshot {
         positions: shown.iter().map(position).collect(),
         class: shown.iter().map(class).collect(),
-        radii: shown.iter().map(|&p| drawn_radius(plan, all.volume[p] * every as f64)).collect(),
+        radii: shown.iter().map(|&p| drawn_radius(plan, section(p) * every as f64)).collect(),
         scalar: None,
     };
     (picture, shown)
 }
 
-/// Radius at which a particle of a volume (dimensionless) is drawn (m): that of a disc of this volume,
+/// Radius at which a particle of a section (dimensionless) is drawn (m): that of a disc of this area,
 /// in steps of 9 %, so that recordings compress well.
-fn drawn_radius(plan: &Plan, volume: f64) -> f32 {
+fn drawn_radius(plan: &Plan, section: f64) -> f32 {
     const STEPS: f64 = 8.0;
-    let radius = (volume / PI).sqrt() * plan.units.length;
+    let radius = (section / PI).sqrt() * plan.units.length;
     ((radius.log2() * STEPS).round() / STEPS).exp2() as f32
 }
 

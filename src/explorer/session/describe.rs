@@ -4,6 +4,7 @@ use super::super::knobs::{self, Stop, Switch};
 use super::super::live::Live;
 use super::super::protocol::{DialState, Light, Reading, RunState, State, SwitchState};
 use super::*;
+use crate::scene::Geometry;
 use crate::sim::clock::Limiter;
 use crate::sim::criteria::{ACCURATE_ENERGY, CRITERIA, ENERGY_STEPS};
 use std::time::Instant;
@@ -41,6 +42,7 @@ pub(super) fn run_state(live: &Live) -> RunState {
         seconds_per_step: live.usual_step(),
         particles: row.particles,
         cells: [plan.mesh.x.cells(), plan.mesh.y.cells()],
+        round: plan.scene.domain.geometry == Geometry::Axisymmetric,
         unknowns: knobs::unknowns(plan),
         lights: lights(live),
         readings,

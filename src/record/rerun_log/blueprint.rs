@@ -127,6 +127,9 @@ impl Writer<'_> {
     fn run(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {
         let flow = self.flow(info, paths)?;
         let mut reading = vec![flow];
+        if info.round {
+            reading.insert(0, self.round(paths)?);
+        }
         reading.push(self.text("Plan", &paths.at("plan"))?);
         reading.push(self.text("Scene", &paths.at("scene"))?);
         reading.push(self.log(&paths.at("log"))?);

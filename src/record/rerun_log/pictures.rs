@@ -38,6 +38,9 @@ impl RerunLog {
 
     pub(super) fn snapshot(&mut self, snapshot: &Snapshot) -> Result<(), RecordError> {
         self.particles(&snapshot.particles)?;
+        if self.round {
+            self.round_picture(&snapshot.particles, &snapshot.dye_lines)?;
+        }
         self.rec.log(
             self.paths.at("world/dye"),
             &archetypes::LineStrips2D::new(snapshot.dye_lines.iter().map(Vec::as_slice))
@@ -76,6 +79,7 @@ impl RerunLog {
         expect_length("particle classes", particles.class.len(), count)?;
         let mut points = archetypes::Points2D::update_fields()
             .with_positions(particles.positions.iter().copied());
+        self.round_changed = self.classes != particles.class;
         if self.classes != particles.class {
             self.classes.clone_from(&particles.class);
             points = points.with_class_ids(particles.class.iter().copied());
@@ -83,6 +87,7 @@ impl RerunLog {
         // Old recordings have no radii of their own.
         let usual = [self.particle_radius];
         let radii = if particles.radii.is_empty() { &usual[..] } else { &particles.radii };
+        self.round_changed |= self.radii != radii;
         if self.radii != radii {
             self.radii = radii.to_vec();
             let radius = |&radius: &f32| Radius::new_scene_units(radius);

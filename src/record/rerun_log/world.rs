@@ -15,20 +15,22 @@ pub(super) fn on_dark(color: [u8; 3]) -> [u8; 3] {
     }
 }
 
+/// Names and colours of the materials.
+pub(super) fn classes(info: &RunInfo) -> archetypes::AnnotationContext {
+    let classes = info.materials.iter().enumerate().map(|(i, material)| {
+        let id = u16::try_from(i).unwrap_or(u16::MAX);
+        (id, material.name.as_str(), rgb8(material.rgb))
+    });
+    archetypes::AnnotationContext::new(classes.map(rerun::ClassDescription::from))
+}
+
 impl RerunLog {
     /// Records walls, gauges, legends, and the transform that makes y point up.
     pub(super) fn world(&mut self, info: &RunInfo) -> Result<(), RecordError> {
         let world = self.paths.at("world");
         self.rec
             .log_static(world.clone(), &archetypes::Transform3D::from_scale([1.0, -1.0, 1.0]))?;
-        let classes = info.materials.iter().enumerate().map(|(i, material)| {
-            let id = u16::try_from(i).unwrap_or(u16::MAX);
-            (id, material.name.as_str(), rgb8(material.rgb))
-        });
-        self.rec.log_static(
-            world,
-            &archetypes::AnnotationContext::new(classes.map(rerun::ClassDescription::from)),
-        )?;
+        self.rec.log_static(world, &classes(info))?;
         self.rec.log_static(
             self.paths.at("world/particles"),
             &archetypes::Points2D::update_fields()

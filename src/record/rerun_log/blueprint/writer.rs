@@ -43,6 +43,19 @@ impl Writer<'_> {
         self.space(&title, paths, &FLOW, colour_bar::seen(info.domain, colour_bar::Room::Large))
     }
 
+    /// The view of a round flow in three dimensions.
+    pub(super) fn round(&mut self, paths: &Paths) -> Result<Node, RecordError> {
+        let node = self.view("3D", "Round", &paths.at("round").to_string(), &["+ $origin/**"])?;
+        let [r, g, b] = PAPER;
+        self.property(
+            &node,
+            "Background",
+            &archetypes::Background::new(components::BackgroundKind::SolidColor)
+                .with_color(Color::from_rgb(r, g, b)),
+        )?;
+        Ok(node)
+    }
+
     pub(super) fn fields(
         &mut self,
         info: &RunInfo,
