@@ -263,3 +263,17 @@ pub fn drop(contrast: f64, b: f64, cells: u32) -> Result<f64, CaseError> {
     let theory = 2.0 / 3.0 * (1.0 + contrast) / (2.0 + 3.0 * contrast);
     Ok(sum / volume / theory)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bessel_functions_are_those_of_tables() {
+        // M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, table 9.8
+        let table = [(0, 1.0, 1.266_065_878), (1, 1.0, 0.565_159_104), (0, 5.0, 27.239_871_82)];
+        for (n, x, value) in table {
+            assert!((bessel_i(n, x) / value - 1.0).abs() < 1e-9);
+        }
+    }
+}

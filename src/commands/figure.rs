@@ -4,6 +4,7 @@
 mod bands;
 mod discharge;
 mod paper;
+mod round_silo;
 mod runs;
 
 use super::{Failure, print};
@@ -39,6 +40,9 @@ enum Name {
     Beverloo,
     /// Width of a shear band of grains against the mesh size, with and without internal length
     Bands,
+    /// Discharge of a round and of a plane silo against the internal length
+    #[value(name = "round_silo")]
+    RoundSilo,
 }
 
 /// Runs the command.
@@ -49,6 +53,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Name::Hourglass => "hourglass",
         Name::Beverloo => "beverloo",
         Name::Bands => "bands",
+        Name::RoundSilo => "round_silo",
     };
     let out = args.out.clone().unwrap_or_else(|| Path::new("figures").join(name));
     let clock = Instant::now();
@@ -58,6 +63,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Name::Hourglass => discharge::hourglass(args, &out),
         Name::Beverloo => discharge::beverloo(args, &out),
         Name::Bands => bands::make(args, &out),
+        Name::RoundSilo => round_silo::make(args, &out),
     }?;
     print(&format!("{said}in {}", duration(clock.elapsed().as_secs_f64())))
 }

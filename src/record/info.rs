@@ -17,12 +17,14 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
     let f = |v: f64| (v * plan.units.length) as f32;
     let (x, y) = (&plan.mesh.x, &plan.mesh.y);
     let domain = Rect { min: [f(x.start()), f(y.start())], max: [f(x.end()), f(y.end())] };
+    let round = plan.scene.domain.geometry == Geometry::Axisymmetric;
     let ends = |s: &Segment| s.ends().map(|p| p.map(f)).to_vec();
     // Openings in a side are gaps in its line; a side without parts is drawn whole, open or not.
     let mut walls: Vec<Outline> = plan
         .boundary
         .pieces()
         .filter(|(s, piece)| plan.boundary.sides[*s].pieces.len() == 1 || !piece.open)
+        .filter(|(s, _)| !(round && *s == 0 && x.start() == 0.0))
         .map(|(s, piece)| Outline { name: SIDES[s].into(), points: ends(&piece.segment) })
         .collect();
     let aligned = |b: &&Block| matches!(b.shape, None | Some(SolidShape::Rectangle { .. }));
@@ -64,7 +66,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         name: name.into(),
         recording_id: format!("{name}-{}", &hash[..hash.len().min(12)]),
         domain,
-        round: plan.scene.domain.geometry == Geometry::Axisymmetric,
+        round,
         walls,
         gauges: plan
             .gauges

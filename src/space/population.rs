@@ -14,6 +14,7 @@
 //!   interface of several materials, and the fields that particles carry, are known from them;
 //! - too few only below `n/4` if it and its neighbours hold one material whose particles carry
 //!   nothing: there the particles only transport the material to the next interface;
+//! - in the cells at an axis too few below `n/2`, since rings that shrink move apart in the section;
 //! - too many above `3 n + 4`.
 //!
 //! Through the fine cells of a graded mesh, the particles of coarse cells are split and merged
@@ -187,6 +188,10 @@ impl Population {
             // Beside slanted walls the flow thins out the particles of single cells.
             return self.largest_need();
         }
+        if mesh.whole_measure(cell).tilt() > NEAR_AXIS {
+            // Towards an axis particles move apart in the section.
+            return self.largest_need();
+        }
         let carries = particles.director.is_some()
             || particles.viscosity.is_some()
             || particles.density.is_some();
@@ -354,6 +359,9 @@ fn keep_centroid(
         }
     }
 }
+
+/// Tilt of the cell from which on it is near the axis: the two columns beside it.
+const NEAR_AXIS: f64 = 0.3;
 
 /// Differences below this are rounding errors; it applies to reference coordinates and to relative
 /// differences of costs.

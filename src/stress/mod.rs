@@ -5,6 +5,7 @@
 //! its verdict says by how much it does.
 
 mod page;
+mod round;
 mod run;
 mod trials;
 

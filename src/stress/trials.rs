@@ -22,6 +22,7 @@ pub fn all() -> Result<Vec<Trial>, CaseError> {
     time_steps(&mut out)?;
     particles(&mut out)?;
     units(&mut out);
+    super::round::trials(&mut out)?;
     Ok(out
         .into_iter()
         .map(|t| {
@@ -85,7 +86,7 @@ impl Trial {
     }
 
     /// Excludes the check of the drift.
-    fn drifting(mut self) -> Self {
+    pub(super) fn drifting(mut self) -> Self {
         self.drifts = true;
         self
     }

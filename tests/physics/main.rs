@@ -1,6 +1,7 @@
 //! Physics tests: exact solutions, convergence rates, invariants and symmetry.
 
 mod alignment;
+mod axisymmetric;
 mod dynamics;
 mod effects;
 mod exact;

@@ -177,6 +177,9 @@ impl Writer<'_> {
             let [width, height] = info.domain.size();
             let flow = if alone { self.flow(info, &paths)? } else { self.lane(info, &paths)? };
             let mut fields = self.fields(info, &paths)?;
+            if info.round {
+                fields.insert(0, self.round(&paths)?);
+            }
             if alone {
                 fields.push(self.text("Plan", &paths.at("plan"))?);
                 fields.push(self.text("Scene", &paths.at("scene"))?);
