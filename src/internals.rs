@@ -2,7 +2,9 @@
 //! in any version.
 
 pub use crate::cases::rayleigh_taylor::{Undulation, growth_ratio};
-pub use crate::cases::solids::{ARRAY_DRAG, SlantedChannel, array_drag, slanted_channel, wedge};
+pub use crate::cases::solids::{
+    ARRAY_DRAG, LowerWall, SlantedChannel, array_drag, slanted_channel, slipping_circle, wedge,
+};
 pub use crate::cases::{
     Case, CoupleWave, Fluid, Layered, couette, couple_wave, coupled_cell, layered_channel,
     poiseuille,

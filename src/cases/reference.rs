@@ -63,7 +63,7 @@ fn solve<const D: usize>(plan: &Plan) -> Result<Solved<'_, D>, SimError> {
         }
         (material.law.at(&Here::without_flow(eta, &orientation)), density, eta)
     });
-    quadrature.bind_slip(mesh, plan.boundary.slip_faces(mesh, &plan.units));
+    quadrature.bind_slip(mesh, &plan.boundary, &plan.units);
     let mut load = plan.fixed_loads::<D>();
     let masses = Masses::Points(&quadrature);
     add_acceleration(plan, masses, &mut load);

@@ -1,17 +1,33 @@
 //! This module holds cases with solids of any shape, whose walls lie across the mesh.
 //!
 //! ```text
-//! channel    u = G y (H - y)/(2 eta)  or, with a wall at y = 0 that slips,  u = G (H^2 - y^2)/(2 eta)
+//! channel    eta u = t (y - H) + (G/2)(H^2 - y^2)  with the shear stress t at the wall y = 0
+//!            t = G H/2  at rest,  t = 0  free slip,  t = (G H/2) H/(H + b)  with the slip length b,
+//!            t = mu p  where it slides with the friction mu under the pressure p
+//! circle     u_theta = A r + C/r,   A a + C/a = -2 b C/a^2
 //! wedge      v_r = -(Q/r)(cos 2 theta - cos 2 alpha)/(sin 2 alpha - 2 alpha cos 2 alpha)
 //! cylinders  F = mu U K, with the mean velocity U of a square array
 //! ```
-//! Channel: force `G` per volume along it. Wedge: half-angle `alpha`; converging flow of G. B. Jeffery
+//! Channel: force `G` per volume along it. Circle: radius `a`, slip length `b`. Wedge: half-angle `alpha`; converging flow of G. B. Jeffery
 //! (1915) and G. Hamel (1917) without inertia. Cylinders: A. S. Sangani, A. Acrivos, "Slow flow past
 //! periodic arrays of cylinders with application to heat transfer", Int. J. Multiphase Flow 8 (1982)
 //! 193.
 
 use super::{Case, CaseError, Exact, Rates, start};
 use crate::scene::SceneSource;
+
+/// The lower wall of a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LowerWall {
+    /// Zero velocity.
+    NoSlip,
+    /// No friction.
+    FreeSlip,
+    /// Navier's law with this slip length.
+    Slip(f64),
+    /// Coulomb's law with the coefficient and the pressure in the channel; small enough to slide.
+    Friction(f64, f64),
+}
 
 /// A channel across the mesh of a unit box.
 #[derive(Clone, Copy, Debug)]
@@ -20,40 +36,51 @@ pub struct SlantedChannel {
     pub degrees: f64,
     /// Width; at most 0.4.
     pub width: f64,
-    /// Whether its lower wall slips.
-    pub slips: bool,
+    /// Its lower wall.
+    pub lower: LowerWall,
 }
 
 /// Flow along a channel. The exact velocity is prescribed on the sides of the box.
 pub fn slanted_channel(channel: SlantedChannel) -> Case {
-    let SlantedChannel { degrees, width, slips } = channel;
+    let SlantedChannel { degrees, width, lower } = channel;
     let (s, c) = degrees.to_radians().sin_cos();
+    // Shear stress at the lower wall.
+    let stress = match lower {
+        LowerWall::NoSlip => 0.5 * width,
+        LowerWall::FreeSlip => 0.0,
+        LowerWall::Slip(b) => 0.5 * width * width / (width + b),
+        LowerWall::Friction(mu, pressure) => mu * pressure,
+    };
     // Distance from the lower wall.
     let y = format!("({c:?}*(y - 0.5) - {s:?}*(x - 0.5) + {:?})", 0.5 * width);
-    let speed = if slips {
-        format!("0.5*({width:?}^2 - {y}^2)")
-    } else {
-        format!("0.5*{y}*({width:?} - {y})")
-    };
+    let speed = format!("({stress:?}*({y} - {width:?}) + 0.5*({width:?}^2 - {y}^2))");
     let corner = |along: f64, across: f64| {
         format!("[{:?}, {:?}]", 0.5 + along * c - across * s, 0.5 + along * s + across * c)
     };
     let (near, far) = (0.5 * width, 3.0);
-    let block = |name: &str, kind: &str, sign: f64| {
+    let block = |name: &str, wall: &str, sign: f64| {
         let corners = [(-2.0, near), (2.0, near), (2.0, far), (-2.0, far)];
         let corners: Vec<String> = corners.map(|(a, b)| corner(a, sign * b)).into();
-        format!(
-            "[[blocks]]\nname = \"{name}\"\nkind = \"{kind}\"\nshape.polygon = [{}]\n",
-            corners.join(", ")
-        )
+        format!("[[blocks]]\nname = \"{name}\"\n{wall}\nshape.polygon = [{}]\n", corners.join(", "))
     };
-    let lower = if slips { "free_slip" } else { "no_slip" };
+    let no_slip = "kind = \"no_slip\"";
+    let (mut law, mut reference) = (no_slip.to_string(), String::new());
+    match lower {
+        LowerWall::NoSlip => {}
+        LowerWall::FreeSlip => law = "kind = \"free_slip\"".into(),
+        LowerWall::Slip(b) => law = format!("slip_length = {b:?}"),
+        LowerWall::Friction(mu, p) => {
+            law = format!("wall_friction = {mu:?}");
+            reference = format!("[pressure_reference]\nat = [0.5, 0.5]\nvalue = {p:?}\n");
+        }
+    }
     let text = format!(
-        "{}[body_force]\nx = {c:?}\ny = {s:?}\n{}{}",
+        "{}[body_force]\nx = {c:?}\ny = {s:?}\n{reference}{}{}",
         open_box("slanted_channel", &format!("{c:?}*{speed}"), &format!("{s:?}*{speed}")),
-        block("lower", lower, -1.0),
-        block("upper", "no_slip", 1.0),
+        block("lower", &law, -1.0),
+        block("upper", no_slip, 1.0),
     );
+    let pressure = if let LowerWall::Friction(_, p) = lower { p } else { 0.0 };
     Case {
         name: "slanted_channel".into(),
         title: "flow along a channel across the mesh",
@@ -62,8 +89,40 @@ pub fn slanted_channel(channel: SlantedChannel) -> Case {
         exact: Exact {
             velocity: Box::new(move |x, y| {
                 let y = c * (y - 0.5) - s * (x - 0.5) + 0.5 * width;
-                let u = if slips { width * width - y * y } else { y * (width - y) };
-                [0.5 * c * u, 0.5 * s * u, 0.0]
+                let u = stress * (y - width) + 0.5 * (width * width - y * y);
+                [c * u, s * u, 0.0]
+            }),
+            pressure: Box::new(move |_, _| pressure),
+        },
+        rates: Rates { velocity: 2.0, rotation: None, pressure: None },
+    }
+}
+
+/// Flow around a circle along which it slips, with the slip length `b`. The exact velocity is prescribed
+/// on the sides of the box.
+pub fn slipping_circle(b: f64) -> Case {
+    const CENTRE: [f64; 2] = [0.52, 0.47];
+    const RADIUS: f64 = 0.21;
+    let c = -1.0 / (1.0 / (RADIUS * RADIUS) + 2.0 * b / RADIUS.powi(3));
+    let [x, y] = [format!("(x - {:?})", CENTRE[0]), format!("(y - {:?})", CENTRE[1])];
+    let turning = format!("(1 + {c:?}/({x}^2 + {y}^2))");
+    let text = format!(
+        "{}[[blocks]]\nname = \"circle\"\nslip_length = {b:?}\n\
+         shape.circle = {{ centre = [{:?}, {:?}], radius = {RADIUS:?} }}\n",
+        open_box("slipping_circle", &format!("-{y}*{turning}"), &format!("{x}*{turning}")),
+        CENTRE[0],
+        CENTRE[1]
+    );
+    Case {
+        name: "slipping_circle".into(),
+        title: "flow around a circle along which it slips",
+        source: "circular Couette flow",
+        scene: SceneSource::new("slipping_circle", text),
+        exact: Exact {
+            velocity: Box::new(move |x, y| {
+                let [x, y] = [x - CENTRE[0], y - CENTRE[1]];
+                let turning = 1.0 + c / (x * x + y * y);
+                [-y * turning, x * turning, 0.0]
             }),
             pressure: Box::new(|_, _| 0.0),
         },

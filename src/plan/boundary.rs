@@ -100,6 +100,8 @@ pub struct BoundaryPlan {
     pub sides: [Side; 4],
     /// Walls and sides of blocks.
     pub walls: Vec<WallLine>,
+    /// Law of each solid of any shape along which material slips, in the order of the solids.
+    pub solids: Vec<Option<WallLaw>>,
     /// Nozzles inside the domain; their sides are among `walls`.
     pub sources: Vec<Source>,
     /// Directions (x, y) in which no boundary condition prevents a rigid translation.
@@ -288,6 +290,7 @@ pub(super) fn boundary(
             }
         }
     }
+    let solids: Vec<_> = walls.solids.iter().map(|s| slips.of(s)).collect();
     let held = |c: usize| {
         let holds = |p: &Piece| {
             let slips = p.conditions.slip.is_some() && p.segment.normal != c;
@@ -298,6 +301,7 @@ pub(super) fn boundary(
             || mesh
                 .parts()
                 .is_some_and(|parts| parts.solids.iter().any(|s| s.no_slip || s.outline.holds(c)))
+            || solids.iter().any(Option::is_some)
     };
     // Inertia determines the velocity of a body that nothing holds.
     // No flow around an axis is a translation along the radius.
@@ -313,8 +317,15 @@ pub(super) fn boundary(
             "open a side or a part of one (kind = \"open\" or \"outflow\"), or give a bulk_viscosity",
         ));
     }
-    let mut plan =
-        BoundaryPlan { sides, walls: lines, sources, free_translation, closed, correction: 0.0 };
+    let mut plan = BoundaryPlan {
+        sides,
+        walls: lines,
+        solids,
+        sources,
+        free_translation,
+        closed,
+        correction: 0.0,
+    };
     if closed {
         let (mut net, total) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
         if mesh.parts().is_some() && net != 0.0 && net.abs() < LARGEST_CORRECTION * total {

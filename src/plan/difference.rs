@@ -15,7 +15,10 @@ impl Plan {
             (self.initial != other.initial, "the values that particles carry"),
             (supports(self) != supports(other), "the boundaries"),
             (enters(self) != enters(other), "what enters"),
-            (slips(self) != slips(other), "the slip at walls"),
+            (
+                slips(self) != slips(other) || self.boundary.solids != other.boundary.solids,
+                "the slip at walls",
+            ),
             (
                 loads(self) != loads(other) || self.acceleration != other.acceleration,
                 "the boundaries' values or the loads",

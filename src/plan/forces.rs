@@ -3,9 +3,11 @@
 use super::Units;
 use super::boundary::{BoundaryPlan, SIDES};
 use super::resolve::walls::Walls;
+use super::slip::tangent;
 use crate::space::embedding::aligned;
 use crate::space::mesh::Mesh;
 use crate::space::segment::Segment;
+use crate::space::shape::SIDE_NODES;
 
 /// A gauge of the force of the materials on a side, a wall or a block.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,12 +99,18 @@ pub(super) fn force_gauges(
             }
         }
     }
+    // Nodes that slide along walls bear friction although their velocity is not given.
+    let mut slides = vec![[false; 2]; mesh.nodes()];
+    for face in boundary.slip_faces(mesh, units) {
+        let nodes = mesh.cell_nodes(face.cell);
+        SIDE_NODES[face.side].iter().for_each(|&a| slides[nodes[a]][tangent(face.side)] = true);
+    }
     // First the normal components, so that those of corners belong to the face they press on.
     for normal_first in [true, false] {
         for (k, support) in supports.iter().enumerate() {
             for face in &support.faces {
                 let c = if normal_first { face.normal } else { 1 - face.normal };
-                for node in face.nodes(mesh).filter(|&n| given.is_fixed(n, c)) {
+                for node in face.nodes(mesh).filter(|&n| given.is_fixed(n, c) || slides[n][c]) {
                     if owner[node][c] == usize::MAX {
                         owner[node][c] = k;
                     }

@@ -25,7 +25,7 @@ pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
 pub use effects::{Effect, EffectKind, EffectList, StepTime};
 pub use forces::ForceGauge;
 pub use resolve::resolve;
-pub use slip::{Slip, SlipFace, WallLaw};
+pub use slip::{Slip, SlipFace, SlipPoint, WallLaw};
 pub use sources::{Entering, Source};
 pub use units::Units;
 pub use warning::Warning;

@@ -79,6 +79,7 @@ impl Plan {
         let mut list: Vec<String> = sides.collect();
         let mut others: Vec<String> =
             self.boundary.walls.iter().filter_map(|w| w.slip.as_ref()).map(law).collect();
+        others.extend(self.boundary.solids.iter().flatten().map(law));
         others.dedup();
         list.extend(others.iter().map(|law| format!("walls and blocks: {law}")));
         list.dedup();

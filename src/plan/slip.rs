@@ -3,6 +3,7 @@
 use super::{BoundaryPlan, Units};
 use crate::scene::FieldFn;
 use crate::space::mesh::{Axis, Mesh};
+use crate::space::outline_rule::OutlinePoint;
 use crate::space::segment::Segment;
 use crate::space::shape::{SIDE_NODES, side_normal};
 
@@ -43,6 +44,27 @@ pub struct SlipFace {
     pub wall: [f64; 3],
 }
 
+/// A point of the outline of a solid of any shape along which material slips, in the plan's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlipPoint {
+    /// The cell.
+    pub cell: usize,
+    /// Its place on the outline.
+    pub at: OutlinePoint,
+    /// Law of the solid; a slip length is in the plan's units.
+    pub law: WallLaw,
+    /// Velocity of the solid along the tangent.
+    pub wall: f64,
+}
+
+impl SlipPoint {
+    /// Unit tangent of the outline.
+    pub fn tangent(&self) -> [f64; 2] {
+        let [x, y] = self.at.normal;
+        [-y, x]
+    }
+}
+
 impl WallLaw {
     /// The law in the plan's units.
     fn scaled(self, units: &Units) -> WallLaw {
@@ -59,7 +81,21 @@ impl BoundaryPlan {
         let rubs = |law: &WallLaw| matches!(law, WallLaw::Friction { .. });
         let sides = self.pieces().filter_map(|(_, piece)| piece.conditions.slip.as_ref());
         let walls = self.walls.iter().filter_map(|w| w.slip.as_ref());
-        sides.map(|s| &s.law).chain(walls).any(rubs)
+        sides.map(|s| &s.law).chain(walls).chain(self.solids.iter().flatten()).any(rubs)
+    }
+
+    /// The points of outlines along which material slips, in ascending order of their cells.
+    pub fn slip_points(&self, mesh: &Mesh, units: &Units) -> Vec<SlipPoint> {
+        if self.solids.iter().all(Option::is_none) {
+            return vec![];
+        }
+        let of_cell = |cell: usize| {
+            mesh.outline_points(cell).into_iter().filter_map(move |at| {
+                let law = self.solids[at.solid]?.scaled(units);
+                Some(SlipPoint { cell, at, law, wall: 0.0 })
+            })
+        };
+        (0..mesh.cells()).flat_map(of_cell).collect()
     }
 
     /// The faces that slide along walls, in ascending order of their cells.

@@ -129,7 +129,7 @@ impl<const D: usize> Simulation<D> {
         let mut quadrature =
             Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len());
         quadrature.bind_walls(|cell| constraints.fixed_sides(&mesh, cell));
-        quadrature.bind_slip(&mesh, plan.boundary.slip_faces(&mesh, &plan.units));
+        quadrature.bind_slip(&mesh, &plan.boundary, &plan.units);
         let stokes = Stokes::new(mesh.clone(), constraints);
         let population =
             Population::new(&mesh, &plan.enclosure, plan.method.seeding, plan.background());

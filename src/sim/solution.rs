@@ -32,7 +32,7 @@ impl<const D: usize> Simulation<D> {
         self.factors_of_points.extend_from_slice(self.quadrature.composition().factors());
         let Flow { velocity, pressure } = &self.flow;
         let last = Iterate { mesh: &plan.mesh, velocity, pressure };
-        let nonlinear = self.quadrature.slip().has_friction()
+        let nonlinear = self.quadrature.has_wall_friction()
             || self.matter.materials.iter().any(|m| m.law.depends_on().needs_flow());
         let known = !nonlinear || velocity.as_flattened().iter().any(|&u| u != 0.0);
         let last: &dyn LastFlow = if known { &last } else { &NoFlow };

@@ -150,7 +150,9 @@ impl<const D: usize> Matrices<D> {
         }
         // Terms on faces are not part of the content: cells with such a term are always computed.
         let faces = || from.terms_on_faces().flat_map(|t| t.faces());
+        let outlines = from.quadrature.slip_outlines();
         faces().for_each(|face| self.built_from[face.cell] = Content::Unknown);
+        outlines.cells().iter().for_each(|&cell| self.built_from[cell] = Content::Unknown);
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
             let known = content.is_constant() && content == *built_from;
@@ -234,6 +236,7 @@ impl<const D: usize> Fresh<D> {
                 }
             }
         }
+        quadrature.slip_outlines().add_stiffness(cell, &mut k);
         let mass = measure.pressure_mass();
         let viscosity = quadrature.mean_viscosity[cell]
             + if D == 3 { turning } else { 0.0 }

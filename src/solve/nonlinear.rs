@@ -204,7 +204,7 @@ impl<const D: usize> Stokes<D> {
             self.report(&work.residual, loads, flow, report)?;
             let mut converged = report.decrement.is_some_and(|d| d <= stopping.nonlinear);
             // The decrement does not tell whether friction holds a body that hardly deforms.
-            if quadrature.slip().has_friction() {
+            if quadrature.has_wall_friction() {
                 let most = (FRICTION_POWER * stopping.nonlinear).max(ROUNDING);
                 converged &= report.power_error() <= most;
             }

@@ -28,6 +28,7 @@ use super::points::{CutStiffness, INSIDE_SOLIDS, IntegrationPoint};
 use super::sides::Kinked;
 use super::softening::{self, Directions, SofteningPoint};
 use super::terms::slip::SlipFaces;
+use super::terms::slip_outline::SlipOutlines;
 use crate::composition::{Composition, Content, EmptyCell, Kind, SCRATCH};
 use crate::laws::point::PointLaw;
 use crate::laws::rates::Rates;
@@ -74,6 +75,8 @@ pub struct Quadrature {
     pub(super) softened: bool,
     /// Walls along which material slips.
     pub(super) slip: SlipFaces,
+    /// Outlines of solids along which material slips.
+    pub(super) slip_outlines: SlipOutlines,
     /// Volume factors of the materials in the last update.
     factors: Vec<f64>,
     /// Whether each cell is evaluated.
@@ -116,6 +119,7 @@ impl Quadrature {
             directions: vec![],
             softened: true,
             slip: SlipFaces::default(),
+            slip_outlines: SlipOutlines::default(),
             factors: vec![],
             chosen: vec![],
         }

@@ -73,10 +73,27 @@ impl<const D: usize> Stokes<D> {
                 }
             }
         }
+        self.add_slip_outlines(quadrature, flow, out);
         if let Some(relations) = self.constraints.embedding() {
             out.on_solids.clear();
             out.on_solids.extend(relations.nodes().map(|node| out.force[node]));
             relations.reduce(&mut out.force);
+        }
+    }
+
+    /// Adds the friction along outlines, and its powers.
+    fn add_slip_outlines(&self, quadrature: &Quadrature, flow: &Flow<D>, out: &mut Residual<D>) {
+        let outlines = quadrature.slip_outlines();
+        for &cell in outlines.cells() {
+            let nodes = &self.incidence.nodes[cell];
+            let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
+            let (force, powers) = outlines.force(cell, u);
+            out.dissipation += powers.dissipated;
+            out.supplied += powers.supplied;
+            for (&node, f) in nodes.iter().zip(force) {
+                out.force[node][0] += f[0];
+                out.force[node][1] += f[1];
+            }
         }
     }
 

@@ -35,12 +35,13 @@ use super::quadrature::Quadrature;
 use super::report::{Report, SolveError, Stopping};
 use super::residual::PRESSURE_SHARE;
 use super::symbolic::Symbolic;
-use super::terms::Terms;
+use super::terms::{FaceTerm, Terms};
 use crate::simd::Simd;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
 use crate::space::mesh::Mesh;
 use crate::space::parts::Parts;
+use crate::space::shape::SIDE_NODES;
 use crate::threads;
 use std::sync::Arc;
 use std::time::Instant;
@@ -54,6 +55,13 @@ const CONTINUED: f64 = 1e-5;
 const MOST_CONTINUATIONS: u32 = 8;
 /// Largest number of further corrections that reduce the error of the balance of powers.
 const POWER_CORRECTIONS: u32 = 3;
+
+/// Takes forces on nodes away from others.
+fn take<const D: usize>(out: &mut [[f64; D]], nodes: &[usize], force: &[[f64; 2]]) {
+    for (&node, f) in nodes.iter().zip(force) {
+        (0..2).for_each(|c| out[node][c] -= f[c]);
+    }
+}
 
 impl<const D: usize> Stokes<D> {
     /// Creates the problem on a mesh; nothing is assembled or factored yet.
@@ -138,6 +146,18 @@ impl<const D: usize> Stokes<D> {
             for (node, force) in relations.nodes().zip(&work.residual.on_solids) {
                 out[node][..2].copy_from_slice(&force[..2]);
             }
+        }
+        // The friction along walls that slip is a force on the flow, and its opposite on the wall.
+        let (slip, outlines) = (quadrature.slip(), quadrature.slip_outlines());
+        for (index, face) in slip.faces().iter().enumerate() {
+            let nodes = SIDE_NODES[face.side].map(|a| self.incidence.nodes[face.cell][a]);
+            let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
+            take(out, &nodes, &slip.force(index, nodes, u).0);
+        }
+        for &cell in outlines.cells() {
+            let nodes = &self.incidence.nodes[cell];
+            let u = nodes.map(|n| [flow.velocity[n][0], flow.velocity[n][1]]);
+            take(out, nodes, &outlines.force(cell, u).0);
         }
         // The pressure on outlines does no work on the flow.
         for (cell, part) in self.mesh.parts().into_iter().flat_map(Parts::all) {

@@ -14,6 +14,7 @@ pub mod measure;
 pub mod mesh;
 pub mod neighbours;
 pub mod outline;
+pub mod outline_rule;
 pub mod particles;
 pub mod parts;
 pub mod population;

@@ -56,7 +56,7 @@ fn twice_area(corners: &[Point]) -> f64 {
     edges(corners).map(|[a, b]| cross(a, b)).sum()
 }
 
-fn edges(corners: &[Point]) -> impl Iterator<Item = [Point; 2]> + '_ {
+pub(super) fn edges(corners: &[Point]) -> impl Iterator<Item = [Point; 2]> + '_ {
     (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
 }
 

@@ -2,7 +2,9 @@
 
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number, rate};
-use crate::cases::solids::{ARRAY_DRAG, SlantedChannel, array_drag, slanted_channel, wedge};
+use crate::cases::solids::{
+    ARRAY_DRAG, LowerWall, SlantedChannel, array_drag, slanted_channel, slipping_circle, wedge,
+};
 use crate::cases::{Case, CaseError};
 
 /// Numbers of cells per side.
@@ -31,11 +33,17 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         "Relative error of the velocity in the fluid.",
         &["case", "cells", "velocity", "rate"],
     );
-    let channel = |degrees, slips| slanted_channel(SlantedChannel { degrees, width: 0.25, slips });
-    let list: [(&str, Case); 5] = [
-        ("channel at 30 degrees", channel(30.0, false)),
-        ("channel at 12 degrees, lower wall slips", channel(12.0, true)),
-        ("channel at 30 degrees, lower wall slips", channel(30.0, true)),
+    use LowerWall::{FreeSlip, Friction, NoSlip, Slip};
+    let channel = |degrees, lower| slanted_channel(SlantedChannel { degrees, width: 0.25, lower });
+    let list: [(&str, Case); 10] = [
+        ("channel at 30 degrees", channel(30.0, NoSlip)),
+        ("channel at 12 degrees, lower wall slips", channel(12.0, FreeSlip)),
+        ("channel at 30 degrees, lower wall slips", channel(30.0, FreeSlip)),
+        ("channel at 12 degrees, slip length 0.1", channel(12.0, Slip(0.1))),
+        ("channel at 30 degrees, slip length 0.1", channel(30.0, Slip(0.1))),
+        ("channel at 30 degrees, wall friction", channel(30.0, Friction(0.4, 0.2))),
+        ("circle, slip length 0.1", slipping_circle(0.1)),
+        ("circle, slip length 0.01", slipping_circle(0.01)),
         ("wedge of 20 degrees", wedge(20.0)),
         ("wedge of 30 degrees", wedge(30.0)),
     ];

@@ -1,13 +1,16 @@
 //! Solids of any shape: exact flows beside walls across the mesh, and runs in which nothing enters a
 //! solid or is lost.
 
-use grainscope::internals::{ARRAY_DRAG, SlantedChannel, array_drag, slanted_channel, wedge};
+use crate::scene;
+use grainscope::internals::{
+    ARRAY_DRAG, LowerWall, SlantedChannel, array_drag, slanted_channel, slipping_circle, wedge,
+};
 use grainscope::sim::Run;
 
 #[test]
 fn a_channel_across_the_mesh_is_exact() {
     for degrees in [7.0, 30.0, 41.0] {
-        let channel = SlantedChannel { degrees, width: 0.25, slips: false };
+        let channel = SlantedChannel { degrees, width: 0.25, lower: LowerWall::NoSlip };
         let e = slanted_channel(channel).errors(32, &[]).unwrap();
         assert!(e.velocity < 5e-4, "{degrees}: {e:?}");
     }
@@ -16,9 +19,48 @@ fn a_channel_across_the_mesh_is_exact() {
 #[test]
 fn walls_that_slip_hold_the_normal_velocity_only() {
     for degrees in [12.0, 30.0] {
-        let channel = SlantedChannel { degrees, width: 0.25, slips: true };
+        let channel = SlantedChannel { degrees, width: 0.25, lower: LowerWall::FreeSlip };
         let e = slanted_channel(channel).errors(32, &[]).unwrap();
         assert!(e.velocity < 5e-3, "{degrees}: {e:?}");
+    }
+}
+
+/// Velocity errors of a case at 16 and 64 cells, and their order.
+fn order(case: &grainscope::internals::Case) -> [f64; 3] {
+    let [a, b] = [16, 64].map(|n| case.errors(n, &[]).unwrap().velocity);
+    [a, b, (a / b).log2() / 2.0]
+}
+
+#[test]
+fn slip_lengths_hold_along_slanted_walls() {
+    for (degrees, b) in [(30.0, 0.1), (30.0, 0.01), (12.0, 0.1), (41.0, 0.5)] {
+        let lower = LowerWall::Slip(b);
+        let case = slanted_channel(SlantedChannel { degrees, width: 0.25, lower });
+        let [coarse, fine, order] = order(&case);
+        eprintln!("{degrees} {b}: {coarse:.2e} {fine:.2e} {order:.2}");
+        assert!(order > 2.0 && fine < 1e-3, "{degrees}, {b}: {coarse:.2e} {fine:.2e} {order:.2}");
+    }
+}
+
+#[test]
+fn slip_lengths_hold_along_circles() {
+    for b in [0.01, 0.1, 1.0] {
+        let [coarse, fine, order] = order(&slipping_circle(b));
+        eprintln!("{b}: {coarse:.2e} {fine:.2e} {order:.2}");
+        assert!(order > 2.0 && fine < 1e-3, "{b}: {coarse:.2e} {fine:.2e} {order:.2}");
+    }
+}
+
+#[test]
+fn slanted_walls_with_friction_slide_at_their_strength() {
+    // Wall friction 0.08, less than the 0.125 at which the lower wall sticks.
+    for degrees in [12.0, 30.0] {
+        let lower = LowerWall::Friction(0.4, 0.2);
+        let case = slanted_channel(SlantedChannel { degrees, width: 0.25, lower });
+        let [coarse, fine] = [16, 64]
+            .map(|n| case.errors(n, &["accuracy.nonlinear_tolerance=1e-6"]).unwrap().velocity);
+        eprintln!("{degrees}: {coarse:.2e} {fine:.2e}");
+        assert!(fine < 1e-3, "{degrees}: {coarse:.2e} {fine:.2e}");
     }
 }
 
@@ -51,7 +93,7 @@ fn hopper(extra: &str) -> Box<dyn Run> {
          [[blocks]]\nname = \"hr\"\nkind = \"no_slip\"\n\
          shape.polygon = [[1, 1.2], [0.3, 0.3], [0.3, 0], [1, 0]]\n{extra}"
     );
-    crate::scene(&text, &[])
+    scene(&text, &[])
 }
 
 /// Volume that is not solid, m2.
@@ -127,4 +169,49 @@ fn the_forces_on_all_walls_are_the_loads() {
     // The weight is that of the shares in the cells, which the volumes of particles approach.
     assert!((sum[1] / (-10.0 * mass) - 1.0).abs() < 1e-3, "{sum:?} {mass}");
     assert!(sum[0].abs() < 1e-6 * mass, "{sum:?}");
+}
+
+/// Grains on a plane of 30 degrees whose friction is less than its slope. Its normal is (-1/2, cos 30).
+const SLIDE: &str = r#"schema = 1
+name = "slide"
+gravity = [0, -10]
+[domain]
+x = [0, 2]
+y = [0, 2]
+[accuracy]
+cells = 24
+[time]
+end = 0.2
+[materials.grains]
+density = 1000
+friction = { static = 0.7, grain_diameter = 1e-3 }
+[materials.air]
+shear_viscosity = 0.1
+background = true
+[[regions]]
+material = "grains"
+shape.polygon = [[0.6, 0.3464], [1.4, 0.8083], [1.2, 1.1547], [0.4, 0.6928]]
+[boundaries]
+top.kind = "open"
+left.kind = "open"
+[[blocks]]
+name = "plane"
+wall_friction = 0.3
+shape.polygon = [[-1, -0.57735], [3, 1.73205], [3, -1], [-1, -1]]
+[[gauges]]
+name = "plane"
+on = "plane"
+"#;
+
+#[test]
+fn a_block_of_grains_rubs_on_a_slanted_plane() {
+    let mut run = scene(SLIDE, &[]);
+    let (sin, cos) = 30f64.to_radians().sin_cos();
+    for _ in 0..4 {
+        let f = run.row().forces[0];
+        let (normal, along) = (sin * f.x - cos * f.y, -cos * f.x - sin * f.y);
+        eprintln!("{} {normal} {along} {}", run.row().time, along / normal);
+        assert!((along / normal / 0.3 - 1.0).abs() < 1e-2, "{along} {normal}");
+        run.step().unwrap();
+    }
 }

@@ -81,7 +81,6 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
 
     let mut walls = Walls::new(scene, scope, domain)?;
     let slips = slip::Slips::new(scene, scope)?;
-    slips.refuse_on(&walls.solids)?;
     let supports = forces::names(&walls);
     let (gauges, wanted) = gauges::gauges(scene, scope, domain, &supports)?;
     gauges::interest(scene)?;

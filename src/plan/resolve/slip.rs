@@ -66,15 +66,4 @@ impl Slips {
     pub(in crate::plan) fn of(&self, solid: &SiSolid) -> Option<WallLaw> {
         if solid.wall { self.walls[solid.index] } else { self.blocks[solid.index] }
     }
-
-    /// Refuses laws of solids of any shape.
-    pub(super) fn refuse_on(&self, solids: &[SiSolid]) -> Result<()> {
-        let Some(solid) = solids.iter().find(|s| self.of(s).is_some()) else { return Ok(()) };
-        Err(SceneError::of_key(
-            format!("{}[{}]", if solid.wall { "walls" } else { "blocks" }, solid.index),
-            format!("`{}` is a solid of any shape and slips by a law", solid.name),
-            "slip_length and wall_friction act on walls along x or y: give kind = \"no_slip\" or \
-             \"free_slip\"",
-        ))
-    }
 }

@@ -10,17 +10,20 @@
 //! | inertia | [`inertia`] | yes | yes |
 //! | restoring force of stable stratification | [`restoring`] | yes | yes |
 //! | friction at walls along which material slips | [`slip`] | yes | yes |
+//! | friction along outlines of solids | [`slip_outline`] | yes | yes |
 //! | body forces and tractions fixed in space | [`plan::loads`](crate::plan::loads) | | yes |
 //!
 //! The first three exist in every cell and are called by name. [`Terms`] lists the terms that only
 //! some scenes have; the friction at walls depends on the laws of the materials beside them and is part
 //! of the [`quadrature`](crate::solve::quadrature).
 
+pub mod contact;
 pub mod inertia;
 pub mod pressure;
 pub mod restoring;
 pub mod rotation;
 pub mod slip;
+pub mod slip_outline;
 pub mod viscous;
 pub mod weight;
 

@@ -23,64 +23,18 @@
 //!
 //! The integral over a face is exact for biquadratic velocities: three Gauss points.
 
+use super::contact::{Beside, Contact};
 use super::{CellFace, FaceTerm, Powers};
 use crate::plan::slip::{SlipFace, WallLaw, tangent};
 use crate::space::measure::FaceMeasure;
 use crate::space::mesh::Mesh;
 use crate::space::shape::{GAUSS_3, GAUSS_3_WEIGHTS, VALUES_AT_GAUSS};
 
-/// Smallest share of the resistance that the matrix has where material slides, so that friction alone
-/// can hold a body.
-const LEAST: f64 = 1e-3;
-
 /// Number of points of a face.
 const POINTS: usize = 3;
 
-/// What is beside a face.
-#[derive(Clone, Debug, Default)]
-pub struct Beside {
-    /// Mean viscosity of the cell.
-    pub viscosity: f64,
-    /// Largest resistance to slip, for friction.
-    pub largest: f64,
-    /// Volume fraction of the materials that rub: all but the background.
-    pub share: f64,
-    /// Velocity and pressure at the points of the face; `None` if no flow is known.
-    pub flow: Option<[([f64; 2], f64); POINTS]>,
-}
-
-/// Friction at a point of a face.
-#[derive(Clone, Copy, Debug, Default)]
-struct Contact {
-    /// Force per area and velocity, `r`.
-    resistance: f64,
-    /// Slip `s`.
-    slip: f64,
-    /// `m`; zero without friction.
-    effective: f64,
-    /// Direction `q`.
-    direction: f64,
-    /// Viscous normal stress `tau_nn`.
-    normal: f64,
-    /// Normal stress `N` on the wall.
-    pressing: f64,
-}
-
-impl Contact {
-    fn slides(&self) -> bool {
-        self.effective > 0.0 && self.slip.abs() >= self.effective
-    }
-
-    /// The entry of the matrix, force per area and velocity.
-    fn tangent(&self) -> f64 {
-        if self.slides() {
-            let along = (1.0 - self.direction * self.slip.signum()).max(LEAST);
-            self.resistance * along
-        } else {
-            self.resistance
-        }
-    }
-}
+/// Velocity and pressure at a point.
+pub type AtPoint = ([f64; 2], f64);
 
 /// The faces of cells along which material slips.
 #[derive(Clone, Debug, Default)]
@@ -133,45 +87,30 @@ impl SlipFaces {
         self.friction
     }
 
-    /// Evaluates the law of a face.
-    pub fn evaluate(&mut self, face: usize, beside: &Beside) {
+    /// Evaluates the law of a face; `flow`: velocity and pressure at its points, if a flow is known.
+    pub fn evaluate(&mut self, face: usize, beside: &Beside, flow: Option<[AtPoint; POINTS]>) {
         let wall = &self.walls[face];
         let along = tangent(wall.side);
         for (k, contact) in self.contacts[face].iter_mut().enumerate() {
-            let coefficient = match wall.law {
-                WallLaw::Slip { length } => {
-                    contact.resistance = beside.viscosity / length;
-                    continue;
-                }
-                WallLaw::Friction { coefficient } => coefficient,
-            };
-            // Without a flow, everything sticks.
-            contact.resistance = beside.largest;
-            let Some((u, pressure)) = beside.flow.map(|f| f[k]) else { continue };
-            let moving: f64 = VALUES_AT_GAUSS[k].iter().zip(wall.wall).map(|(n, w)| n * w).sum();
-            contact.slip = u[along] - moving;
-            contact.pressing = (pressure - contact.normal).max(0.0);
-            let strength = coefficient * beside.share * contact.pressing;
-            let sticks = strength / beside.largest;
-            contact.effective = contact.slip.abs().max(sticks);
-            contact.resistance =
-                if contact.effective > 0.0 { strength / contact.effective } else { 0.0 };
+            let here = flow.map(|flow| {
+                let (u, pressure) = flow[k];
+                let moving = VALUES_AT_GAUSS[k].iter().zip(wall.wall).map(|(n, w)| n * w);
+                (u[along] - moving.sum::<f64>(), pressure)
+            });
+            contact.evaluate(wall.law, beside, here);
         }
     }
 
     /// Takes a share of the change of the viscous normal stresses at the points of a face.
     pub fn press(&mut self, face: usize, share: f64, normal: [f64; POINTS]) {
         for (contact, normal) in self.contacts[face].iter_mut().zip(normal) {
-            contact.normal += share * (normal - contact.normal);
+            contact.press(share, normal);
         }
     }
 
     /// Gives the frictions the directions of the slip.
     pub fn align(&mut self) {
-        for contact in self.contacts.as_flattened_mut() {
-            contact.direction =
-                if contact.effective > 0.0 { contact.slip / contact.effective } else { 0.0 };
-        }
+        self.contacts.as_flattened_mut().iter_mut().for_each(Contact::align);
     }
 
     /// Keeps the current contacts for [`SlipFaces::turn`].
@@ -183,14 +122,7 @@ impl SlipFaces {
     pub fn turn(&mut self, share: f64) {
         let now = self.contacts.as_flattened_mut().iter_mut();
         for (contact, before) in now.zip(self.before.as_flattened()) {
-            if before.effective == 0.0 {
-                continue;
-            }
-            let (q, change) = (before.direction, contact.slip - before.slip);
-            let turn = if before.slides() { before.slip.signum() * change } else { 0.0 };
-            let step = change - turn * q + share * (before.slip - q * before.effective);
-            let next = q + step / before.effective;
-            contact.direction = if next.is_finite() { next.clamp(-1.0, 1.0) } else { 0.0 };
+            contact.turn(before, share);
         }
     }
 }
@@ -246,7 +178,7 @@ mod tests {
         for (cell, side) in [(0, 0), (1, 1), (0, 2), (5, 3)] {
             let wall = [0.2, -0.4, 1.1];
             let mut slip = SlipFaces::new(&mesh, vec![SlipFace { cell, side, law, wall }]);
-            slip.evaluate(0, &Beside { viscosity: 2.0, ..Beside::default() });
+            slip.evaluate(0, &Beside { viscosity: 2.0, ..Beside::default() }, None);
             let u = [[0.3, 0.9], [-0.2, 0.5], [0.7, -0.1]];
             let (force, powers) = slip.force(0, [0; 3], u);
             let taken: f64 = (0..3).map(|k| -force[k][0] * u[k][0] - force[k][1] * u[k][1]).sum();
@@ -283,8 +215,8 @@ mod tests {
         slip.press(0, 1.0, [-1.0; 3]);
         let mut friction = |u: f64, pressure: f64| {
             let flow = Some([([u, 0.0], pressure); 3]);
-            let beside = Beside { viscosity: 1.0, largest: 100.0, share: 1.0, flow };
-            slip.evaluate(0, &beside);
+            let beside = Beside { viscosity: 1.0, largest: 100.0, share: 1.0 };
+            slip.evaluate(0, &beside, flow);
             slip.align();
             let force: f64 = slip.force(0, [0; 3], [[u, 0.0]; 3]).0.iter().map(|f| f[0]).sum();
             (force, slip.entry(0, [1, 1], [0, 0]))
