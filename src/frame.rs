@@ -36,6 +36,8 @@ pub struct Snapshot {
     pub arrows: Option<Arrows>,
     /// Isolines of fields.
     pub isolines: Vec<Isoline>,
+    /// Closed outlines of the solids that move (m).
+    pub moving: Vec<Vec<[f32; 2]>>,
 }
 
 /// Particles at one instant. Their number may differ between pictures.

@@ -30,7 +30,8 @@ const FIELD_STEPS = 4094;
 const RADIUS_STEPS = 8;
 
 // The content of a frame, in metres: {count, x, y, material, radius (of each particle), lines (flat
-// arrays x, y, x, y, ...), strokes (x, y of both ends in turn), fields (by name)}.
+// arrays x, y, x, y, ...), strokes (x, y of both ends in turn), fields (by name), moving (outlines of
+// solids that move, as lines)}.
 function decodeFrame(bytes, description) {
   const r = new Reader(bytes);
   const [count, lineCount, pointCount, strokeCount, fieldCount] = [r.u32(), r.u32(), r.u32(), r.u32(), r.u32()];
@@ -88,7 +89,13 @@ function decodeFrame(bytes, description) {
       },
     };
   }
-  return { count, x, y, material, radius, lines, strokes, fields };
+  const moving = [];
+  for (let left = r.u32(); left > 0; left--) {
+    const outline = new Float32Array(2 * r.u32());
+    for (let k = 0; k < outline.length; k++) outline[k] = r.f32();
+    moving.push(outline);
+  }
+  return { count, x, y, material, radius, lines, strokes, fields, moving };
 }
 
 // The value of a field at a point (m) by bilinear interpolation between the centres of its samples;

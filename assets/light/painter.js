@@ -139,6 +139,7 @@ function paint(surface, description, frame, moment, look, rect, unit) {
   surface.clip(fx - 2 * unit, fy - 2 * unit, fw + 4 * unit, fh + 4 * unit);
   for (const side of sides) {
     for (const wall of description.walls) surface.line(map(wall.points.flat(), side, Y), 2.5 * unit, theme.wall);
+    for (const outline of frame.moving) surface.line(map(outline, side, Y), 2.5 * unit, theme.wall);
     if (look.gauges) for (const gauge of description.gauges) surface.line(map(gauge.points.flat(), side, Y), 3 * unit, theme.gauge);
   }
   surface.unclip();

@@ -68,9 +68,9 @@ impl FrameBuffer {
 /// Approximate size of the picture of a frame (bytes).
 fn size(frame: &Frame) -> usize {
     let Some(p) = &frame.snapshot else { return 0 };
-    let Snapshot { particles, dye_lines, glyphs, fields, arrows, isolines } = p;
+    let Snapshot { particles, dye_lines, glyphs, fields, arrows, isolines, moving } = p;
     let arrows = arrows.as_ref().map_or(0, |a| 16 * a.origins.len());
-    let strips = isolines.iter().flat_map(|i| &i.strips).map(Vec::len).sum::<usize>();
+    let strips = isolines.iter().flat_map(|i| &i.strips).chain(moving).map(Vec::len).sum::<usize>();
     14 * particles.positions.len()
         + particles.scalar.as_ref().map_or(0, |s| 4 * s.values.len())
         + 8 * dye_lines.iter().map(Vec::len).sum::<usize>()

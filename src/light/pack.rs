@@ -13,6 +13,7 @@
 //! | dye lines | `u32` number of points of each; differences of x and y in turn, zigzag, high, low |
 //! | strokes | x and y of both ends in turn: differences, zigzag, high bytes, low bytes |
 //! | field | `u16` index in the list of fields, width, height, 0; `f32` smallest and largest value, ends of the colour scale; differences from the left neighbour, zigzag, high bytes, low bytes |
+//! | solids that move | `u32` number, then of each `u32` number of points; `f32` x and y in turn |
 
 use crate::frame::{GridField, ParticleSnapshot, Rect, RunInfo, Snapshot, extent};
 
@@ -64,6 +65,11 @@ pub fn pack(snapshot: &Snapshot, info: &RunInfo, most: usize) -> Vec<u8> {
     differences(lines.iter().flatten().map(|p| place.at(*p)), &mut out);
     differences(snapshot.glyphs.iter().flatten().map(|p| place.at(*p)), &mut out);
     fields.into_iter().for_each(|(index, field)| pack_field(index, field, &mut out));
+    out.extend((snapshot.moving.len() as u32).to_le_bytes());
+    for line in &snapshot.moving {
+        out.extend((line.len() as u32).to_le_bytes());
+        line.as_flattened().iter().for_each(|v| out.extend(v.to_le_bytes()));
+    }
     out
 }
 

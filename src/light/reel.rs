@@ -68,6 +68,7 @@ impl Reel {
         };
         let particles = recorded.particles();
         let (dye, glyphs) = (recorded.dye_lines(), recorded.glyphs());
+        let moving = recorded.moving();
         let fields: Vec<_> = recorded.fields(info.domain).into_values().collect();
         let mut reel = Reel {
             description: Description::new(info),
@@ -88,6 +89,7 @@ impl Reel {
                     .filter_map(|list| at(list, *time))
                     .map(|field| coarse(field, detail.samples, info))
                     .collect(),
+                moving: at(&moving, *time).cloned().unwrap_or_default(),
                 ..Snapshot::default()
             };
             let count = particles.positions.len();

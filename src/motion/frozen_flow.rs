@@ -72,6 +72,8 @@ pub struct FrozenFlow<'a> {
     pub enclosure: &'a Enclosure,
     /// Length of the step, in the plan's units.
     pub dt: f64,
+    /// Time of its start after that of the solids of the mesh.
+    pub start: f64,
     /// Velocity of every cell at the middle of the step.
     velocities: &'a Currents,
     edges: &'a [Option<Edge>],
@@ -172,10 +174,26 @@ impl<'a> FrozenFlow<'a> {
                     *u = [u[0] + psi * jump[0], u[1] + psi * jump[1]];
                 }
             }
-            nodal
+            // A solid that moves takes along what is in its cells.
+            mesh.solid_velocity(cell).map_or(nodal, |velocity| [velocity; NODES])
         });
         let simd = Simd::used();
-        FrozenFlow { mesh, enclosure, dt, velocities: cells, edges, streams, free, simd }
+        FrozenFlow {
+            mesh,
+            enclosure,
+            dt,
+            start: 0.0,
+            velocities: cells,
+            edges,
+            streams,
+            free,
+            simd,
+        }
+    }
+
+    /// The start of the step and the time `dt` later, after the time of the solids.
+    fn times(&self, dt: f64) -> [f64; 2] {
+        [self.start, self.start + dt]
     }
 
     /// Part of the velocity of a cell that has a kink, if there is one.
@@ -234,7 +252,7 @@ impl<'a> FrozenFlow<'a> {
         let mesh = self.mesh;
         let goal = [p[0] + dt * u[0], p[1] + dt * u[1]];
         let (cell, r) = home.near(goal).unwrap_or_else(|| {
-            let place = match self.enclosure.follow(mesh, p, goal) {
+            let place = match self.enclosure.follow_during(mesh, [p, goal], self.times(dt)) {
                 Landing::Free(q) | Landing::Held(q) => mesh.wrap(q),
                 Landing::Left => p,
             };
@@ -259,11 +277,12 @@ impl<'a> FrozenFlow<'a> {
         if let Some((cell, _)) = home.near(goal) {
             return Displacement { to: goal, left: false, held: false, middle, cell: Some(cell) };
         }
-        let (to, left, held) = match self.enclosure.follow(self.mesh, p, goal) {
-            Landing::Free(q) => (q, false, false),
-            Landing::Held(q) => (q, false, true),
-            Landing::Left => (goal, true, false),
-        };
+        let (to, left, held) =
+            match self.enclosure.follow_during(self.mesh, [p, goal], self.times(dt)) {
+                Landing::Free(q) => (q, false, false),
+                Landing::Held(q) => (q, false, true),
+                Landing::Left => (goal, true, false),
+            };
         Displacement { to, left, held, middle, cell: None }
     }
 

@@ -9,6 +9,7 @@ use super::{Matter, Units};
 use crate::scene::{FieldFn, SceneError, WallKind};
 use crate::space::constraints::Constraints;
 use crate::space::mesh::Mesh;
+use crate::space::parts::Parts;
 use crate::space::segment::Segment;
 use crate::space::shape::{SIDE_NODES, side_normal};
 
@@ -181,8 +182,10 @@ impl BoundaryPlan {
                 let c = if pass == 0 { normal } else { 1 - normal };
                 if let Some(f) = &piece.conditions.velocity[c] {
                     for node in piece.segment.nodes(mesh) {
-                        let at = |[x, y]: [f64; 2]| f.at(x * units.length, y * units.length);
-                        let v = mesh.continued(node, normal, at) / units.velocity();
+                        let at = |[x, y]: [f64; 2]| {
+                            f.at(x * units.length, y * units.length) / units.velocity()
+                        };
+                        let v = mesh.continued(node, (normal, c), at);
                         let outwards = c == normal && (v > 0.0) == upper;
                         let factor = if outwards { 1.0 - self.correction } else { 1.0 };
                         out.fix(node, c, factor * v);
@@ -252,6 +255,12 @@ impl BoundaryPlan {
             // Only the part of the sides that solids leave free counts; faces inside cancel.
             let mut velocity = vec![[0.0; D]; mesh.nodes()];
             given.impose(&mut velocity);
+            total += mesh
+                .parts()
+                .into_iter()
+                .flat_map(Parts::all)
+                .map(|(_, p)| p.swept.abs())
+                .sum::<f64>();
             net = (0..mesh.cells())
                 .map(|cell| mesh.volume_rate(cell, |node| [velocity[node][0], velocity[node][1]]))
                 .sum();
@@ -332,14 +341,17 @@ pub(super) fn boundary(
             // The outflow depends linearly on the correction.
             plan.correction = LARGEST_CORRECTION;
             let (less, _) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
-            plan.correction *= net / (net - less);
+            // Without prescribed outflow there is nothing to correct.
+            plan.correction = if less == net { 0.0 } else { plan.correction * net / (net - less) };
             (net, _) = plan.net_outflow(mesh, &plan.constraints::<2>(mesh, units));
         }
         if net.abs() > 1e-9 * total {
+            let moves = mesh.parts().is_some_and(Parts::move_on);
             return Err(SceneError::of_key(
                 "boundaries",
                 format!(
-                    "the given normal velocities let {:.3e} {} of incompressible fluid flow out",
+                    "the given normal velocities{} let {:.3e} {} of incompressible fluid flow out",
+                    if moves { " and the blocks that move" } else { "" },
                     net * units.volume_rate(),
                     if mesh.measure().is_ring() { "m3/s" } else { "m2/s" }
                 ),

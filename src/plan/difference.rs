@@ -8,13 +8,14 @@ impl Plan {
     /// Short description of a difference other than the values of materials and gravity, which
     /// alone may change during a run; `None` if there is no such difference.
     pub fn beyond_matter(&self, other: &Plan) -> Option<&'static str> {
-        let checks: [(bool, &str); 13] = [
+        let checks: [(bool, &str); 14] = [
             (geometry(self) != geometry(other), "the mesh"),
             (self.effects != other.effects, "the set of solved effects"),
             (!same_history(&self.state, &other.state), "the kind of a material"),
             (self.initial != other.initial, "the values that particles carry"),
             (supports(self) != supports(other), "the boundaries"),
             (enters(self) != enters(other), "what enters"),
+            (self.moving != other.moving, "the velocity of a block"),
             (
                 slips(self) != slips(other) || self.boundary.solids != other.boundary.solids,
                 "the slip at walls",

@@ -91,7 +91,7 @@ pub(super) fn force_gauges(
     let given = boundary.constraints::<2>(mesh, units);
     if let (Some(parts), Some(relations)) = (mesh.parts(), given.embedding()) {
         let along_lines = aligned(mesh, parts, |node| relations.holds(node));
-        let sites = relations.nodes().chain(along_lines.into_iter().map(|(node, _)| node));
+        let sites = relations.nodes().chain(along_lines.into_iter().map(|(node, ..)| node));
         for node in sites {
             if let Some((solid, _)) = parts.nearest(mesh.node_position(node)) {
                 let index = supports[..solids].iter().position(|s| s.name == solid.name);

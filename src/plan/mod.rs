@@ -14,6 +14,7 @@ pub mod loads;
 pub mod material;
 pub mod memory;
 mod meshing;
+mod moving;
 mod reasons;
 mod resolve;
 pub mod slip;
@@ -24,6 +25,7 @@ mod warning;
 pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
 pub use effects::{Effect, EffectKind, EffectList, StepTime};
 pub use forces::ForceGauge;
+pub use moving::{Moving, Pose};
 pub use resolve::resolve;
 pub use slip::{Slip, SlipFace, SlipPoint, WallLaw};
 pub use sources::{Entering, Source};
@@ -58,6 +60,10 @@ pub struct Plan {
     pub enclosure: Enclosure,
     /// Boundary conditions.
     pub boundary: BoundaryPlan,
+    /// Blocks that move.
+    pub moving: Vec<Moving>,
+    /// Where they are, and their velocities.
+    pub poses: Vec<Pose>,
     /// Point at which the pressure is given, where the boundaries determine it only up to a
     /// constant; its mean is zero if no point is given.
     pub pressure_reference: Option<PressurePoint>,

@@ -92,7 +92,11 @@ impl BoundaryPlan {
         let of_cell = |cell: usize| {
             mesh.outline_points(cell).into_iter().filter_map(move |at| {
                 let law = self.solids[at.solid]?.scaled(units);
-                Some(SlipPoint { cell, at, law, wall: 0.0 })
+                let velocity = mesh.parts()?.solids[at.solid].velocity;
+                let mut out = SlipPoint { cell, at, law, wall: 0.0 };
+                let t = out.tangent();
+                out.wall = velocity[0] * t[0] + velocity[1] * t[1];
+                Some(out)
             })
         };
         (0..mesh.cells()).flat_map(of_cell).collect()

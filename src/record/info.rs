@@ -27,7 +27,10 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         .filter(|(s, _)| !(round && *s == 0 && x.start() == 0.0))
         .map(|(s, piece)| Outline { name: SIDES[s].into(), points: ends(&piece.segment) })
         .collect();
-    let aligned = |b: &&Block| matches!(b.shape, None | Some(SolidShape::Rectangle { .. }));
+    let aligned = |b: &&Block| {
+        matches!(b.shape, None | Some(SolidShape::Rectangle { .. }))
+            && !plan.moving.iter().any(|m| m.name == b.name)
+    };
     let blocks = plan.scene.blocks.iter().filter(aligned);
     let names = plan
         .scene
@@ -44,7 +47,9 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
             .zip(names)
             .map(|(o, name)| Outline { name, points: ends(o) }),
     );
+    let moves = |name: &str| plan.moving.iter().any(|m| m.name == name);
     let solids = plan.mesh.parts().into_iter().flat_map(|parts| &parts.solids);
+    let solids = solids.filter(|s| !moves(&s.name));
     walls.extend(solids.map(|s| {
         let points = s.outline.line().into_iter().map(|p| p.map(f)).collect();
         Outline { name: s.name.clone(), points }

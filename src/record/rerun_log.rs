@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `world/particles`, `world/dye`, `world/directors` | the flow |
 //! | `world/walls`, `world/gauges` | fixed lines |
+//! | `world/moving` | outlines of blocks that move |
 //! | `world/fields/<field>/{image,bar,ticks,isolines}` | one field |
 //! | `world/fields/<field>/values` | its values, on half as many samples per side |
 //! | the path of each scalar, and `<path>/log10` | the plots |

@@ -126,7 +126,16 @@ impl MatchLiteral for Literal {
     }
 }
 
-/// A compiled expression in `x` and `y`; cheap to clone.
+/// Names of variables, in alphabetical order.
+pub type Variables = &'static [&'static str];
+
+/// The coordinates.
+pub const COORDINATES: Variables = &["x", "y"];
+
+/// The time.
+pub const TIME: Variables = &["t"];
+
+/// A compiled expression in `x` and `y`, or in `t`; cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Expr(Arc<Inner>);
 
@@ -145,12 +154,12 @@ impl PartialEq for Expr {
 
 impl Expr {
     /// Parses an expression. `names` gives the values of the names that it may use, and `known`
-    /// lists them for messages. It may use `x` and `y` only if `coordinates` is true.
+    /// lists them for messages. `variables`: those that it may use, no more than two.
     pub fn parse<'a>(
         text: &str,
         names: &'a dyn Fn(&str) -> Option<f64>,
         known: &'a dyn Fn() -> Vec<&'a str>,
-        coordinates: bool,
+        variables: Variables,
     ) -> Result<Self, ExprError> {
         if text.len() > MAX_LENGTH {
             let message =
@@ -159,7 +168,7 @@ impl Expr {
             return Err(ExprError { message, help, at: 0..text.len() });
         }
         let mut reader =
-            Reader { text, pos: 0, depth: 0, names, known, coordinates, uses: [false; 2] };
+            Reader { text, pos: 0, depth: 0, names, known, variables, uses: [false; 2] };
         let canonical = reader.expression(0)?;
         if let Some(rest) = reader.rest().chars().next() {
             let what = match rest {
@@ -177,12 +186,12 @@ impl Expr {
         Ok(Expr(Arc::new(Inner { flat, uses: reader.uses })))
     }
 
-    /// Whether the value does not depend on `x` or `y`.
+    /// Whether the value does not depend on a variable.
     pub fn is_constant(&self) -> bool {
         self.0.uses == [false; 2]
     }
 
-    /// The value at a point (m); NaN where the expression is undefined.
+    /// The value at a point (m), or at a time `x` (s); NaN where the expression is undefined.
     pub fn at(&self, x: f64, y: f64) -> f64 {
         let Inner { flat, uses } = &*self.0;
         match uses {
@@ -205,7 +214,7 @@ mod tests {
             "minimum" => Some(-3.0),
             _ => None,
         };
-        Expr::parse(text, &names, &|| vec!["a", "minimum"], true)
+        Expr::parse(text, &names, &|| vec!["a", "minimum"], COORDINATES)
     }
 
     fn value(text: &str) -> f64 {
@@ -382,7 +391,7 @@ mod tests {
         assert!(parse("a + x").is_ok_and(|e| !e.is_constant()));
         assert_eq!(parse("a+x").ok(), parse("2 + x").ok());
         assert_ne!(parse("a+x").ok(), parse("2 + y").ok());
-        let e = Expr::parse("x", &|_| None, &Vec::new, false).expect_err("no coordinates");
+        let e = Expr::parse("x", &|_| None, &Vec::new, &[]).expect_err("no coordinates");
         assert!(e.message.contains("`x` is a coordinate"), "{e:?}");
     }
 

@@ -11,7 +11,7 @@ use serde::ser::{Serialize, Serializer};
 use toml::Spanned;
 
 use super::error::{Place, SceneError};
-use super::expr::{Expr, ExprError};
+use super::expr::{COORDINATES, Expr, ExprError, TIME, Variables};
 use super::scope::Scope;
 
 /// A number, or an expression over the scene's parameters such as `"alpha * aperture"`.
@@ -53,9 +53,9 @@ impl<const XY: bool> Value<XY> {
     }
 
     /// Compiles the expression with the values of the parameters.
-    fn read(&self, text: &str, scope: &Scope) -> Result<Expr, SceneError> {
+    fn read(&self, text: &str, scope: &Scope, variables: Variables) -> Result<Expr, SceneError> {
         let known = || scope.iter().map(|(name, _)| name).collect();
-        Expr::parse(text, &|name| scope.get(name), &known, XY)
+        Expr::parse(text, &|name| scope.get(name), &known, variables)
             .map_err(|error| self.fault(text, &error))
     }
 
@@ -95,8 +95,26 @@ impl Value<false> {
     pub fn eval(&self, scope: &Scope) -> Result<f64, SceneError> {
         match &self.raw {
             Raw::Number(value) => self.finite(*value),
-            Raw::Text(text) => self.finite(self.read(text, scope)?.at(0.0, 0.0)),
+            Raw::Text(text) => self.finite(self.read(text, scope, &[])?.at(0.0, 0.0)),
         }
+    }
+
+    /// The function of the time `t` (s), which [`FieldFn::at`] takes as its first argument; fails if the
+    /// expression is invalid, or constant and not finite, or if `t` is a parameter.
+    pub fn in_time(&self, scope: &Scope) -> Result<FieldFn, SceneError> {
+        let expr = match &self.raw {
+            Raw::Number(value) => return Ok(FieldFn::Constant(self.finite(*value)?)),
+            Raw::Text(text) => self.read(text, scope, TIME)?,
+        };
+        if expr.is_constant() {
+            return Ok(FieldFn::Constant(self.finite(expr.at(0.0, 0.0))?));
+        }
+        if scope.get(TIME[0]).is_some() {
+            let message =
+                format!("{} uses `t`, which is the time here, and a parameter too", self.shown());
+            return Err(SceneError::at(self, message, "give the parameter another name"));
+        }
+        Ok(FieldFn::Varying(expr))
     }
 }
 
@@ -106,7 +124,7 @@ impl Value<true> {
     pub fn compile(&self, scope: &Scope) -> Result<FieldFn, SceneError> {
         let expr = match &self.raw {
             Raw::Number(value) => return Ok(FieldFn::Constant(self.finite(*value)?)),
-            Raw::Text(text) => self.read(text, scope)?,
+            Raw::Text(text) => self.read(text, scope, COORDINATES)?,
         };
         if expr.is_constant() {
             Ok(FieldFn::Constant(self.finite(expr.at(0.0, 0.0))?))

@@ -1045,6 +1045,12 @@ pub struct Block {
         "examples" = [{ "polygon": [[0, 0], [0.5, 0], [0, 0.5]] }]
     ))]
     pub shape: Option<SolidShape>,
+    /// Velocity along x and y with which the block moves through the mesh, without turning: numbers, or
+    /// expressions of the parameters and of the time `t` in s, such as `"0.1*(t > 2)"`. A block that moves
+    /// may reach out of the domain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m/s", "x-range" = "any", "x-default" = "at rest", "examples" = [[0, "0.1*(t > 2)"]]))]
+    pub velocity: Option<[Quantity; 2]>,
     /// Kind of boundary condition on its faces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-default" = "`\"free_slip\"`", "examples" = ["no_slip"]))]

@@ -3,6 +3,7 @@
 use super::fault::Fault;
 use super::initial::Unfilled;
 use crate::composition::EmptyCell;
+use crate::scene::SceneError;
 use crate::solve::report::SolveError;
 use crate::words::count;
 
@@ -51,6 +52,31 @@ pub enum SimError {
         time: f64,
         /// The fault of the state.
         fault: Fault,
+    },
+    /// The blocks that move make the flow impossible.
+    #[error("step {step}, t = {time:.6e} s: {}", source.one_line())]
+    Blocks {
+        /// Number of the step.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// What is wrong, with the remedy.
+        source: SceneError,
+    },
+    /// A block that moves closes a part of the domain whose volume it changes.
+    #[error(
+        "step {step}, t = {time:.6e} s: a block that moves encloses incompressible material near x = \
+         {x:.4e}, y = {y:.4e} and changes the volume there"
+    )]
+    Trapped {
+        /// Number of the step.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// Coordinate x, m.
+        x: f64,
+        /// Coordinate y, m.
+        y: f64,
     },
     /// The step failed with every shorter length that was tried.
     #[error("{source}; the {}", tried(*.cuts))]
@@ -106,6 +132,11 @@ impl SimError {
             SimError::Step { .. } => {
                 "likely cause: a speed that grows without bound; look at the last frames, and \
                  lower accuracy.cells or the contrast"
+            }
+            SimError::Blocks { .. } => "see the message",
+            SimError::Trapped { .. } => {
+                "stop the block before it closes (velocity = \"v*(t < t_end)\"), leave an opening, or give \
+                 the material a bulk_viscosity"
             }
             SimError::Fault { fault, .. } => fault.remedy(),
             SimError::Cut { source, .. } => source.remedy(),

@@ -101,7 +101,8 @@ impl<const D: usize> Simulation<D> {
             (u[0].abs() * rate[0]).max(u[1].abs() * rate[1])
         };
         let all = self.crossing_rates.iter().enumerate();
-        all.filter(|(node, _)| counts(*node)).map(crossed).fold(0.0, f64::max)
+        let all = all.filter(|(node, _)| counts(*node) && !self.reach.inside(*node));
+        all.map(crossed).fold(0.0, f64::max)
     }
 
     /// Projected area of a material over the volume of its particles.

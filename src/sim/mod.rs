@@ -22,6 +22,7 @@ pub mod inertia;
 pub mod initial;
 mod interest;
 mod measure;
+mod moving;
 mod notes;
 pub mod phases;
 pub mod row;
@@ -125,7 +126,7 @@ impl<const D: usize> Run for Simulation<D> {
         self.next_change
     }
     fn replan(&mut self, plan: Arc<Plan>) {
-        self.plan = plan;
+        self.change_plan(plan);
     }
     fn save(&self, state: &mut State) {
         Simulation::save(self, state);

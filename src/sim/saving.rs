@@ -1,10 +1,12 @@
 //! This module saves a simulation in a [`State`] and restores it.
 
 use super::clock::Limiter;
+use super::error::SimError;
 use super::inertia::Past;
 use super::row::{self, COLUMNS, GaugeRow, Row};
 use super::simulation::{Before, Simulation};
 use super::state::{State, StateError, flat, load_phases, save_phases, wrong_length};
+use crate::plan::Pose;
 use crate::solve::last_flow::Iterate;
 use crate::space::count::Count;
 use crate::space::flow::Flow;
@@ -207,6 +209,9 @@ impl<const D: usize> Simulation<D> {
             s.put_floats("count.volumes", [c.volume_in, c.volume_out]);
         }
         s.put_counts("progress", [self.step, u64::from(self.version), self.next_change as u64]);
+        if !self.standing.is_empty() {
+            s.put_floats("blocks.displacement", self.standing.iter().flat_map(|p| p.displacement));
+        }
         s.put_floats("time", [self.time]);
         s.put_floats("tolerated", self.tolerated);
         s.put_floats("first_energy", [self.first_energy]);
@@ -219,11 +224,31 @@ impl<const D: usize> Simulation<D> {
         save_row(&self.row, s);
     }
 
+    /// Places the blocks that move.
+    fn load_blocks(&mut self, s: &State) -> Result<(), StateError> {
+        if self.plan.moving.is_empty() {
+            return Ok(());
+        }
+        let ([time], name) = (s.numbers("time")?, "blocks.displacement");
+        let places: Vec<[f64; 2]> = s.tuples(name, self.plan.moving.len())?;
+        let time = time * self.plan.units.time;
+        let moving = self.plan.moving.iter().zip(places);
+        let poses =
+            moving.map(|(m, displacement)| Pose { displacement, velocity: m.velocity_at(time) });
+        let poses: Vec<Pose> = poses.collect();
+        let failed =
+            |e: SimError| StateError::Range { name: "blocks.displacement", value: e.to_string() };
+        self.pose(&poses).map_err(failed)?;
+        self.standing = poses;
+        Ok(())
+    }
+
     /// Restores a state of a run of the same plan.
     ///
     /// # Errors
     /// The state does not fit the plan.
     pub(super) fn load(&mut self, s: &State) -> Result<(), StateError> {
+        self.load_blocks(s)?;
         let plan = self.plan.clone();
         let (mesh, materials) = (&plan.mesh, self.matter.materials.len());
         let mut particles = load_particles(s, &self.particles, materials)?;

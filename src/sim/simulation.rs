@@ -5,6 +5,7 @@ use super::error::SimError;
 use super::inertia::Inertia;
 use super::initial;
 use super::interest::Interest;
+use super::moving;
 use super::phases::Phases;
 use super::row::Row;
 use crate::motion::advect::Displacements;
@@ -12,7 +13,7 @@ use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
 use crate::motion::inflow::Inflow;
 use crate::motion::tracers::DyeLines;
-use crate::plan::{Matter, Plan, Warning};
+use crate::plan::{Matter, Plan, Pose, Warning};
 use crate::scene::Quadrature as Rule;
 use crate::solve::density::Density;
 use crate::solve::quadrature::Quadrature;
@@ -31,6 +32,10 @@ use std::time::Instant;
 /// velocities or 3 with Cosserat rotation; [`start`](super::start) chooses it.
 pub struct Simulation<const D: usize> {
     pub(super) plan: Arc<Plan>,
+    /// Places of the blocks that move at the current time.
+    pub(super) standing: Vec<Pose>,
+    /// Nodes at and in the solids that move; empty without any.
+    pub(super) reach: moving::Reach,
     pub(super) stokes: Stokes<D>,
     pub(super) quadrature: Quadrature,
     /// Volume factors of the materials with which the current integration points were made.
@@ -191,6 +196,8 @@ impl<const D: usize> Simulation<D> {
             longest: None,
             attempted: 0.0,
             factors_of_points: vec![],
+            standing: plan.poses.clone(),
+            reach: moving::Reach::of(&plan),
             particles,
             stokes,
             plan,

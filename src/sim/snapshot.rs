@@ -12,6 +12,7 @@ use crate::motion::tracers::DyeLines;
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName};
 use crate::space::flow::{gradient, interpolate};
+use crate::space::outline::Outline;
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
 use crate::threads;
@@ -49,8 +50,19 @@ pub fn initial(plan: &Plan) -> Result<Snapshot, Unfilled> {
     Ok(Snapshot {
         particles: particles(plan, &all).0,
         dye_lines: dye.map_or(vec![], |d| dye_lines(plan, &d)),
+        moving: moving(plan),
         ..Snapshot::default()
     })
+}
+
+/// Outlines of the solids that move.
+fn moving(plan: &Plan) -> Vec<Vec<[f32; 2]>> {
+    let moves = |name: &str| plan.moving.iter().any(|m| m.name == name);
+    let solids = plan.mesh.parts().into_iter().flat_map(|parts| &parts.solids);
+    let line = |outline: &Outline| -> Vec<[f32; 2]> {
+        outline.line().into_iter().map(|p| plan.si(p).map(|c| c as f32)).collect()
+    };
+    solids.filter(|s| moves(&s.name)).map(|s| line(&s.outline)).collect()
 }
 
 /// The particles to draw, without a quantity, and their indices.
@@ -120,6 +132,7 @@ impl<const D: usize> Simulation<D> {
             arrows: fields.iter().any(|f| f.name == "speed").then(|| self.arrows()),
             fields,
             isolines,
+            moving: moving(plan),
         }
     }
 

@@ -4,6 +4,7 @@ use super::Integrator;
 use super::clock::{Limiter, next_step};
 use super::error::SimError;
 use super::inertia::Past;
+use super::moving;
 use super::phases::Phases;
 use super::simulation::{Before, Simulation};
 use crate::motion::advect;
@@ -50,6 +51,12 @@ impl<const D: usize> Simulation<D> {
         {
             (dt, limiter) = (longest, Limiter::Guard);
         }
+        if self.has_moving_solids() {
+            let swept = self.swept_step(dt);
+            if swept < dt {
+                (dt, limiter) = (swept, Limiter::Courant);
+            }
+        }
         let (mut extra, mut shortened) = (0, 0);
         loop {
             self.attempted = dt;
@@ -87,10 +94,14 @@ impl<const D: usize> Simulation<D> {
         if let Some(inertia) = inertia {
             inertia.enter(past(&self.flow, half, dt, parts));
         }
-        let frozen_flow = {
+        let mut frozen_flow = {
             let kinks = quadrature.kinks();
             FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, &kinks, part)
         };
+        if !plan.moving.is_empty() {
+            // The solids are where they are in the middle of the step.
+            frozen_flow.start = -0.5 * dt;
+        }
         for _ in 0..parts {
             advect::advance(
                 &frozen_flow,
@@ -111,16 +122,19 @@ impl<const D: usize> Simulation<D> {
                 dye.advance(&frozen_flow);
                 seconds.dye += phase.elapsed().as_secs_f64();
             }
+            frozen_flow.start += part;
         }
         seconds.motion += phase.elapsed().as_secs_f64() - seconds.dye;
         let phase = Instant::now();
+        let end = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
+        let plan = self.arrive(plan, dt, end)?;
         self.population.control(&plan.mesh, &mut self.particles, &mut self.count);
         for refill in &self.population.refills {
             self.gauges.iter_mut().for_each(|g| g.refill(&plan.mesh, refill));
         }
         seconds.population += phase.elapsed().as_secs_f64();
 
-        self.time = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
+        self.time = end;
         self.step += 1;
         let changed = self.apply_changes();
         let mut before = std::mem::take(&mut self.spare);
@@ -171,6 +185,9 @@ impl<const D: usize> Simulation<D> {
     /// Computes the velocity at the middle of a step of length `dt`, stores it in `half`, and
     /// returns the number of solver corrections.
     fn find_half_step_velocity(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
+        if self.has_moving_solids() {
+            return self.solve_half_step(dt, seconds);
+        }
         self.flow.translation(&mut self.half);
         match (self.plan.method.integrator, &self.previous) {
             (Integrator::Euler, _) => Ok(0),
@@ -191,6 +208,9 @@ impl<const D: usize> Simulation<D> {
     /// flow at these positions, and stores its velocity in `half`. Returns the number of solver
     /// corrections.
     fn solve_half_step(&mut self, dt: f64, seconds: &mut Phases) -> Result<u32, SimError> {
+        let course = self.course(dt);
+        self.pose(&self.standing.clone())?;
+        self.flow.translation(&mut self.half);
         let plan = self.plan.clone();
         let phase = Instant::now();
         let mut there = self.particles.clone();
@@ -198,7 +218,7 @@ impl<const D: usize> Simulation<D> {
         let Simulation { velocities, half, matter, displacements, quadrature, inflow, .. } = self;
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = 0.5 * dt / f64::from(parts);
-        let frozen_flow = {
+        let mut frozen_flow = {
             let kinks = quadrature.kinks();
             FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, &kinks, part)
         };
@@ -216,8 +236,14 @@ impl<const D: usize> Simulation<D> {
             if let Some(inflow) = inflow {
                 inflow.enter(&plan, (half, part), &mut there, no_gauges);
             }
+            frozen_flow.start += part;
         }
-        self.population.control(&plan.mesh, &mut there, &mut ignored);
+        if self.has_moving_solids() {
+            self.pose(&course.middle)?;
+            moving::clear(&self.plan.mesh, &mut there);
+        }
+        let mesh = self.plan.mesh.clone();
+        self.population.control(&mesh, &mut there, &mut ignored);
         seconds.motion += phase.elapsed().as_secs_f64();
         let here = std::mem::replace(&mut self.particles, there);
         let flow = self.flow.clone();
@@ -244,7 +270,7 @@ impl<const D: usize> Simulation<D> {
     fn first_change(&self, dt: f64) -> f64 {
         let now = |node: usize, c: usize| self.flow.velocity[node][c];
         let change = |node: usize| [0, 1].map(|c| self.half[node][c] - now(node, c));
-        dt * self.crossings_of_interest(change)
+        dt * self.crossings_apart(change)
     }
 
     /// Length of the next step, after a step of length `dt` from the flow `before`, at which the
@@ -259,7 +285,7 @@ impl<const D: usize> Simulation<D> {
     /// ```
     fn tolerated_step(&self, before: &Flow<D>, dt: f64) -> f64 {
         let error = dt
-            * self.crossings_of_interest(|node| {
+            * self.crossings_apart(|node| {
                 let (u, v) = (before.velocity[node], self.flow.velocity[node]);
                 [0, 1].map(|c| self.half[node][c] - 0.5 * (u[c] + v[c]))
             });

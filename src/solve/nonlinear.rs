@@ -185,7 +185,11 @@ impl<const D: usize> Stokes<D> {
                 let share = if updates == 0 { 1.0 } else { RELAXED };
                 blend(&mut pressure, share, &flow.pressure);
                 let Flow { velocity, pressure } = &*flow;
-                quadrature.press(share, &Iterate { mesh: &self.mesh, velocity, pressure });
+                quadrature.press(
+                    share,
+                    &self.mesh,
+                    &Iterate { mesh: &self.mesh, velocity, pressure },
+                );
                 updates += 1;
             }
             if near || last.is_none_or(|(_, evaluated)| !evaluated) {

@@ -114,10 +114,11 @@ pub(super) struct Residual<const D: usize> {
     pub(super) dissipation: f64,
     /// Power of the terms that only some scenes have.
     pub(super) restoring: f64,
-    /// Power of the motion of walls along which material slips.
+    /// Power of the motion of walls along which material slips, and of the pressure on what moving solids
+    /// take from cells.
     pub(super) supplied: f64,
-    /// Square of the forces of moving walls along which material slips, in the norm of the residual,
-    /// summed face by face.
+    /// Square of the forces of moving walls along which material slips and of moving solids, in the norm
+    /// of the residual, summed face by face and cell by cell.
     pub(super) drive: f64,
     /// `integral D:D`.
     pub(super) strain: f64,

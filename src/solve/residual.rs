@@ -7,6 +7,7 @@ use super::terms::pressure::Divergence;
 use super::terms::viscous::{Internal, TOGETHER};
 use super::terms::{FaceTerm, Terms};
 use crate::space::flow::Flow;
+use crate::space::parts::Parts;
 use crate::space::shape::{NODES, SIDE_NODES};
 use crate::threads;
 use std::ops::Range;
@@ -74,6 +75,13 @@ impl<const D: usize> Stokes<D> {
             }
         }
         self.add_slip_outlines(quadrature, flow, out);
+        for (cell, part) in
+            self.mesh.parts().filter(|p| p.move_on()).into_iter().flat_map(Parts::all)
+        {
+            let [u, v] = part.velocity;
+            out.supplied += flow.pressure[cell][0] * part.swept;
+            out.drive += quadrature.mean_viscosity[cell] * (u * u + v * v);
+        }
         if let Some(relations) = self.constraints.embedding() {
             out.on_solids.clear();
             out.on_solids.extend(relations.nodes().map(|node| out.force[node]));
@@ -147,7 +155,8 @@ impl<const D: usize> Stokes<D> {
                 pressure_norm += force[a][c] * force[a][c] * self.inverse_diagonal[node][c];
             }
         }
-        let bu = divergence.apply(&u);
+        let mut bu = divergence.apply(&u);
+        bu[0] -= divergence.swept();
         let [mut penalty_norm, mut pressure_square, mut divergence_norm] = [0.0; 3];
         let mut continued = 0.0;
         for q in 0..3 {

@@ -56,7 +56,7 @@ impl Quadrature {
         flow: &dyn LastFlow,
     ) -> Result<(), EmptyCell> {
         self.update_cells(mesh, particles, materials, version, flow)?;
-        self.press(1.0, flow);
+        self.press(1.0, mesh, flow);
         self.evaluate_walls(mesh, materials, flow);
         Ok(())
     }
@@ -92,7 +92,8 @@ impl Quadrature {
             let [hx, hy] = mesh.cell_size(cell);
             let size = hx * at.normal[0].abs() + hy * at.normal[1].abs();
             let beside = self.beside(cell, materials, (rubs, size));
-            self.slip_outlines.evaluate(k, &beside, flow.beside(cell, at.r).filter(|_| rubs));
+            let here = if rubs { pressed(mesh, cell, at.r, flow) } else { None };
+            self.slip_outlines.evaluate(k, &beside, here);
         }
     }
 
@@ -112,8 +113,8 @@ impl Quadrature {
 
     /// Takes the viscous normal stresses at the walls from a flow; `share`: share of their change that
     /// is taken.
-    pub(super) fn press(&mut self, share: f64, flow: &dyn LastFlow) {
-        self.press_outlines(share, flow);
+    pub(super) fn press(&mut self, share: f64, mesh: &Mesh, flow: &dyn LastFlow) {
+        self.press_outlines(share, mesh, flow);
         if !self.slip.has_friction() {
             return;
         }
@@ -142,24 +143,36 @@ impl Quadrature {
         }
     }
 
-    /// Takes the viscous normal stresses along outlines from a flow, each at the nearest integration point.
-    fn press_outlines(&mut self, share: f64, flow: &dyn LastFlow) {
+    /// Takes the viscous normal stresses along outlines from a flow: the mean over the free part of the
+    /// cell, and, the smaller it is the more, over the cells beside it.
+    fn press_outlines(&mut self, share: f64, mesh: &Mesh, flow: &dyn LastFlow) {
         if !self.slip_outlines.has_friction() {
             return;
         }
+        let mut last: Option<(usize, [f64; 3])> = None;
         for k in 0..self.slip_outlines.points().len() {
             let SlipPoint { cell, at, .. } = self.slip_outlines.points()[k];
-            let points = &self.points[self.start[cell] as usize..self.start[cell + 1] as usize];
-            let away = |r: [f64; 2]| (r[0] - at.r[0]).hypot(r[1] - at.r[1]);
-            let near = points.iter().filter(|p| p.weight > 0.0);
-            let near = near.min_by(|a, b| away(a.r).total_cmp(&away(b.r)));
-            let stress = near.and_then(|p| {
-                let s = p.law.stress(&flow.at(cell, p.r)?.rates, 1.0);
-                let [x, y] = at.normal;
-                Some(s.mean + (x * x - y * y) * s.deviator[0] + 2.0 * x * y * s.deviator[1])
-            });
-            self.slip_outlines.press(k, share, stress.unwrap_or(0.0));
+            let mean = match last {
+                Some((known, mean)) if known == cell => mean,
+                _ => blended(mesh, cell, |c| Some(self.mean_stress(c, flow))).unwrap_or_default(),
+            };
+            last = Some((cell, mean));
+            let ([x, y], [mean, first, second]) = (at.normal, mean);
+            let stress = mean + (x * x - y * y) * first + 2.0 * x * y * second;
+            self.slip_outlines.press(k, share, stress);
         }
+    }
+
+    /// Mean of the viscous stresses in a cell: the mean stress and the deviator.
+    fn mean_stress(&self, cell: usize, flow: &dyn LastFlow) -> [f64; 3] {
+        let points = &self.points[self.start[cell] as usize..self.start[cell + 1] as usize];
+        let mut sum = [0.0; 3];
+        for p in points.iter().filter(|p| p.weight > 0.0) {
+            let Some(here) = flow.at(cell, p.r) else { continue };
+            let s = p.law.stress(&here.rates, p.weight);
+            sum = [sum[0] + s.mean, sum[1] + s.deviator[0], sum[2] + s.deviator[1]];
+        }
+        sum
     }
 
     /// Aligns the directions of stresses and frictions with the rates and the slip.
@@ -189,4 +202,35 @@ impl Quadrature {
 fn on_side(side: usize, t: f64, away: f64) -> [f64; 2] {
     let edge = if side.is_multiple_of(2) { -away } else { away };
     if side_normal(side) == 0 { [edge, t] } else { [t, edge] }
+}
+
+/// Velocity and pressure of a flow at a point of an outline. The pressure of a sliver hardly acts on the
+/// flow and is known the less, the smaller it is: there it is that of the cells beside it, continued.
+fn pressed(mesh: &Mesh, cell: usize, r: [f64; 2], flow: &dyn LastFlow) -> Option<([f64; 2], f64)> {
+    let (u, _) = flow.beside(cell, r)?;
+    let p = mesh.from_reference(cell, r);
+    let at = |c: usize| {
+        let r = if c == cell { r } else { mesh.to_near_reference(c, p) };
+        flow.beside(c, r).map(|(_, pressure)| [pressure])
+    };
+    blended(mesh, cell, at).map(|[pressure]| (u, pressure))
+}
+
+/// A quantity in the free part of a cell, weighted with its share of the cell, and in the cells beside it,
+/// with the rest.
+fn blended<const N: usize>(
+    mesh: &Mesh,
+    cell: usize,
+    of: impl Fn(usize) -> Option<[f64; N]>,
+) -> Option<[f64; N]> {
+    let own = of(cell)?;
+    let Some(part) = mesh.part(cell).filter(|part| !part.beside.is_empty()) else {
+        return Some(own);
+    };
+    let mut out = own.map(|v| part.fraction * v);
+    for &near in &part.beside {
+        let weight = (1.0 - part.fraction) / part.beside.len() as f64;
+        out.iter_mut().zip(of(near)?).for_each(|(out, v)| *out += weight * v);
+    }
+    Some(out)
 }

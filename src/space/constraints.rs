@@ -59,8 +59,8 @@ impl<const D: usize> Constraints<D> {
     pub fn embed(&mut self, mesh: &Mesh) {
         let Some(parts) = mesh.parts() else { return };
         let relations = Embedding::new(mesh, parts, |node, c| self.fixed_value(node, c));
-        for (node, c) in embedding::aligned(mesh, parts, |node| relations.holds(node)) {
-            self.fix(node, c, 0.0);
+        for (node, c, value) in embedding::aligned(mesh, parts, |node| relations.holds(node)) {
+            self.fix(node, c, value);
         }
         for node in relations.nodes() {
             for c in 0..2 {

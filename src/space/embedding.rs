@@ -11,7 +11,7 @@
 //! On a straight wall this velocity is exactly zero, and since `d` is of the size of a cell where `q`
 //! is approximated, it is of third order. Corners inside of the solid count too: `q` is continued
 //! there. Along walls that slip this holds for the normal component; the nodes keep their tangential
-//! velocity. All conditions are linear relations of the nodes of one cell, so matrices stay positive
+//! velocity. On a solid that moves, all this holds for the velocity relative to it. All conditions are linear relations of the nodes of one cell, so matrices stay positive
 //! definite and are assembled cell by cell, and no cell is too small: the flow depends on `q`, not on
 //! the volume that is left of a cell.
 //!
@@ -49,11 +49,14 @@ type Map = [[f64; 2]; 2];
 /// of node `a`.
 pub type CellMap = [[f64; 2 * NODES]; 2 * NODES];
 
-/// A node with relations: its velocity is the sum of `map q_k` over the unknowns of some nodes `k`.
+/// A node with relations: its velocity is the sum of `map q_k` over the unknowns of some nodes `k`, and
+/// of the velocity of the solid.
 #[derive(Clone, Debug)]
 struct Node {
     node: u32,
     terms: Vec<(u32, Map)>,
+    /// Velocity where all unknowns are zero: that of the solid, or its normal part.
+    offset: Point,
     /// Components of its own unknown that no term depends on.
     idle: [bool; 2],
     /// Prescribed values of its own unknown.
@@ -78,6 +81,8 @@ struct Site {
     /// Distance from the nearest solid, in cells.
     distance: f64,
     normal: Point,
+    /// Velocity of the solid.
+    velocity: Point,
     no_slip: bool,
     /// Corners beside it, for nodes that are not corners.
     beside: Vec<usize>,
@@ -106,6 +111,7 @@ impl Embedding {
                 let site = sites[nodes[a]].get_or_insert_with(|| Site {
                     distance: distance / scale,
                     normal,
+                    velocity: solid.velocity,
                     no_slip: sticks,
                     beside: BESIDE[a].iter().map(|&b| nodes[b]).collect(),
                     at_rest: part.unresolved,
@@ -171,7 +177,7 @@ impl Embedding {
         Some(map)
     }
 
-    /// Replaces the unknowns of the nodes with relations by their velocities.
+    /// Replaces changes of the unknowns of the nodes with relations by those of their velocities.
     pub fn expand<const D: usize>(&self, velocity: &mut [[f64; D]]) {
         let unknown = |n: u32| [0, 1].map(|c| velocity[n as usize][c]);
         let expanded: Vec<[f64; 2]> = self
@@ -211,10 +217,14 @@ impl Embedding {
     pub fn impose<const D: usize>(&self, velocity: &mut [[f64; D]]) {
         for n in &self.nodes {
             let u = &mut velocity[n.node as usize];
-            let q = n.unknown([u[0], u[1]]);
+            let q = n.unknown([u[0] - n.offset[0], u[1] - n.offset[1]]);
             u[..2].copy_from_slice(&q);
         }
         self.expand(velocity);
+        for n in &self.nodes {
+            let u = &mut velocity[n.node as usize];
+            (u[0], u[1]) = (u[0] + n.offset[0], u[1] + n.offset[1]);
+        }
     }
 }
 
@@ -246,30 +256,39 @@ fn unit(mesh: &Mesh) -> f64 {
 /// The relation of a node.
 fn relation(node: usize, site: &Site, sites: &[Option<Site>], given: [Option<f64>; 2]) -> Node {
     let own = node as u32;
-    let mut out = Node { node: own, terms: vec![], idle: [true; 2], given: [None; 2] };
+    let offset = site.velocity;
+    let mut out = Node { node: own, terms: vec![], offset, idle: [true; 2], given: [None; 2] };
     if site.at_rest {
         return out;
     }
     let (d, n) = (site.distance, site.normal);
     let along = [-n[1], n[0]];
+    let across = n[0] * offset[0] + n[1] * offset[1];
+    if !site.no_slip {
+        out.offset = [n[0] * across, n[1] * across];
+    }
     let held = (0..2).find(|&c| given[c].is_some());
     if site.beside.is_empty() {
         out.idle = [false; 2];
         if site.no_slip {
             out.terms.push((own, [[d, 0.0], [0.0, d]]));
-            let value = |u: f64| if d.abs() > NEAR { u / d } else { 0.0 };
-            out.given = given.map(|u| u.map(value));
+            let value = |c: usize, u: f64| if d.abs() > NEAR { (u - offset[c]) / d } else { 0.0 };
+            out.given = [0, 1].map(|c| given[c].map(|u| value(c, u)));
         } else if let (Some(c), true) = (held, given.iter().flatten().all(|&u| u == 0.0)) {
             // The component that a side of the domain leaves free is normal to the wall in part.
             let mut map = [[0.0; 2]; 2];
             map[1 - c][1 - c] = d;
             out.terms.push((own, map));
             out.idle[c] = true;
-            out.given[1 - c] = given[1 - c];
+            out.offset = [0.0; 2];
+            out.offset[1 - c] = offset[1 - c];
+            let value = |u: f64| if d.abs() > NEAR { (u - offset[1 - c]) / d } else { u };
+            out.given[1 - c] = given[1 - c].map(value);
         } else {
             out.terms.push((own, [[along[0], n[0] * d], [along[1], n[1] * d]]));
             if held.is_some() {
-                let normal = given[0].zip(given[1]).map_or(0.0, |(u, v)| u * n[0] + v * n[1]);
+                let normal = |(u, v)| u * n[0] + v * n[1] - across;
+                let normal = given[0].zip(given[1]).map_or(0.0, normal);
                 let amplitude = if d.abs() > NEAR { normal / d } else { 0.0 };
                 out.given = [Some(tangential(given, along)), Some(amplitude)];
             }
@@ -311,9 +330,13 @@ fn tangential(given: [Option<f64>; 2], along: Point) -> f64 {
     }
 }
 
-/// Components of the velocity of nodes on outlines along mesh lines that are zero: nodes of free cells
-/// without a part, with the component.
-pub fn aligned(mesh: &Mesh, parts: &Parts, holds: impl Fn(usize) -> bool) -> Vec<(usize, usize)> {
+/// Components of the velocity of nodes on outlines along mesh lines that are those of the solid: nodes
+/// of free cells without a part, with the component and its value.
+pub fn aligned(
+    mesh: &Mesh,
+    parts: &Parts,
+    holds: impl Fn(usize) -> bool,
+) -> Vec<(usize, usize, f64)> {
     let scale = unit(mesh);
     let mut out = Vec::new();
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c] && mesh.part(c).is_none()) {
@@ -329,7 +352,7 @@ pub fn aligned(mesh: &Mesh, parts: &Parts, holds: impl Fn(usize) -> bool) -> Vec
             let n = solid.outline.normal(p);
             for c in 0..2 {
                 if solid.no_slip || n[c].abs() > 0.5 {
-                    out.push((node, c));
+                    out.push((node, c, solid.velocity[c]));
                 }
             }
         }

@@ -258,6 +258,12 @@ impl Mesh {
     pub fn part(&self, cell: usize) -> Option<&Part> {
         self.parts.as_deref()?.of(cell)
     }
+    /// Velocity of the solid of any shape that fills a cell, if one does and one moves.
+    pub fn solid_velocity(&self, cell: usize) -> Option<[f64; 2]> {
+        let parts = self.parts().filter(|parts| self.solid[cell] && parts.move_on())?;
+        let (solid, d) = parts.nearest(self.cell_centre(cell))?;
+        (d < 0.0).then_some(solid.velocity)
+    }
     /// Whether a point is inside of a solid.
     pub fn is_solid_at(&self, p: [f64; 2]) -> bool {
         self.is_solid_in(self.locate(p), p)

@@ -115,6 +115,17 @@ impl Outline {
         }
     }
 
+    /// The outline elsewhere.
+    pub fn moved(&self, by: Point) -> Outline {
+        let moved = |p: &Point| [p[0] + by[0], p[1] + by[1]];
+        match self {
+            Outline::Polygon(corners) => Outline::Polygon(corners.iter().map(moved).collect()),
+            Outline::Circle { centre, radius } => {
+                Outline::Circle { centre: moved(centre), radius: *radius }
+            }
+        }
+    }
+
     /// Area enclosed.
     pub fn area(&self) -> f64 {
         match self {
@@ -261,9 +272,49 @@ impl Outline {
     }
 }
 
-/// Moves a point that is inside one of the outlines to the nearest place outside of all; a point
-/// where outlines meet may stay inside one.
-pub fn push_out<'a>(outlines: impl Iterator<Item = &'a Outline> + Clone, mut p: Point) -> Point {
+/// An outline in the way of a path, with its displacements at the start and at the end of the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Obstacle<'a> {
+    /// The outline without displacement.
+    pub outline: &'a Outline,
+    /// Displacements.
+    pub displaced: [Point; 2],
+}
+
+impl<'a> Obstacle<'a> {
+    /// An outline at rest.
+    pub fn at_rest(outline: &'a Outline) -> Self {
+        Obstacle { outline, displaced: [[0.0; 2]; 2] }
+    }
+
+    /// Displacement from the fraction `t` of the path to its end.
+    fn rest(&self, t: f64) -> Point {
+        let [start, end] = self.displaced;
+        [0, 1].map(|c| (1.0 - t) * (end[c] - start[c]))
+    }
+
+    /// Where the rest of a path, from the fraction `t` on, first enters.
+    fn entry(&self, t: f64, from: Point, to: Point) -> Option<Entry> {
+        let (end, rest) = (self.displaced[1], self.rest(t));
+        self.outline.entry(minus(from, minus(end, rest)), minus(to, end))
+    }
+
+    /// Whether a point is inside at the end of the path.
+    fn contains(&self, p: Point) -> bool {
+        self.outline.contains(minus(p, self.displaced[1]))
+    }
+
+    /// The point outside nearest to `p` at the end of the path.
+    fn outside(&self, p: Point) -> Point {
+        let end = self.displaced[1];
+        let q = self.outline.outside(minus(p, end));
+        [q[0] + end[0], q[1] + end[1]]
+    }
+}
+
+/// Moves a point that is inside one of the outlines at the end of a path to the nearest place outside
+/// of all; a point where outlines meet may stay inside one.
+pub fn push_out<'a>(outlines: impl Iterator<Item = Obstacle<'a>> + Clone, mut p: Point) -> Point {
     for _ in 0..4 {
         let Some(o) = outlines.clone().find(|o| o.contains(p)) else { break };
         p = o.outside(p);
@@ -274,22 +325,23 @@ pub fn push_out<'a>(outlines: impl Iterator<Item = &'a Outline> + Clone, mut p: 
 /// End of a straight path from `p0` towards `p1` that slides along the outlines in its way; `None`
 /// if none is.
 pub fn slide<'a>(
-    outlines: impl Iterator<Item = &'a Outline> + Clone,
+    outlines: impl Iterator<Item = Obstacle<'a>> + Clone,
     p0: Point,
     p1: Point,
 ) -> Option<Point> {
-    let (mut from, mut to, mut stopped) = (p0, p1, false);
+    let (mut from, mut to, mut stopped, mut passed) = (p0, p1, false, 0.0);
     for _ in 0..4 {
-        let entries = outlines.clone().filter_map(|o| Some((o.entry(from, to)?, o.size())));
-        let Some((Entry { at, normal }, size)) = entries.min_by(|a, b| a.0.at.total_cmp(&b.0.at))
+        let entries = outlines.clone().filter_map(|o| Some((o.entry(passed, from, to)?, o)));
+        let Some((Entry { at, normal }, o)) = entries.min_by(|a, b| a.0.at.total_cmp(&b.0.at))
         else {
             break;
         };
         stopped = true;
         let rest = [0, 1].map(|c| (1.0 - at) * (to[c] - from[c]));
-        let into = dot(rest, normal);
-        let clear = CLEARANCE * size;
+        let clear = CLEARANCE * o.outline.size();
         from = [0, 1].map(|c| from[c] + at * (to[c] - from[c]) + clear * normal[c]);
+        passed += (1.0 - passed) * at;
+        let into = dot(minus(rest, o.rest(passed)), normal);
         to = [0, 1].map(|c| from[c] + rest[c] - into * normal[c]);
     }
     if outlines.clone().any(|o| o.contains(to)) {
@@ -341,7 +393,7 @@ mod tests {
     #[test]
     fn paths_slide_along_outlines_and_never_end_inside() {
         let (t, c) = (triangle(), Outline::Circle { centre: [2.0, 0.0], radius: 0.9 });
-        let all = || [&t, &c].into_iter();
+        let all = || [&t, &c].into_iter().map(Obstacle::at_rest);
         assert_eq!(slide(all(), [3.0, 3.0], [2.5, 2.5]), None);
         let end = slide(all(), [0.8, 0.8], [0.4, 0.4]).unwrap();
         assert!((end[0] - 0.5).abs() < 1e-8 && (end[1] - 0.5).abs() < 1e-8, "{end:?}");
@@ -355,15 +407,32 @@ mod tests {
             let to = [at[0] + random() - 0.5, at[1] + random() - 0.5];
             let to = [to[0].clamp(-1.0, 4.0), to[1].clamp(-1.0, 2.0)];
             at = slide(all(), at, to).unwrap_or(to);
-            assert!(all().all(|o| !o.contains(at)), "{at:?}");
+            assert!(all().all(|o| !o.outline.contains(at)), "{at:?}");
         }
     }
 
     #[test]
     fn thin_solids_stop_fast_paths() {
         let needle = Outline::polygon(vec![[0.0, 0.0], [1.0, 0.0], [0.5, 1e-6]]);
-        let all = || std::iter::once(&needle);
+        let all = || std::iter::once(Obstacle::at_rest(&needle));
         let end = slide(all(), [0.3, 1.0], [0.4, -1.0]).unwrap();
         assert!(end[1] > 0.0, "{end:?}");
+    }
+
+    #[test]
+    fn outlines_that_move_push_points_ahead() {
+        let wall = Outline::polygon(vec![[-1.0, -9.0], [0.0, -9.0], [0.0, 9.0], [-1.0, 9.0]]);
+        let all =
+            || std::iter::once(Obstacle { outline: &wall, displaced: [[-0.1, 0.0], [0.3, 0.0]] });
+        // A point at rest is overtaken; one that recedes as fast is not touched.
+        let end = slide(all(), [0.1, 0.5], [0.1, 0.7]).unwrap();
+        assert!((end[0] - 0.3).abs() < 1e-7 && (end[1] - 0.7).abs() < 1e-12, "{end:?}");
+        assert_eq!(slide(all(), [0.0, 0.5], [0.41, 0.5]), None);
+        // Behind a wall that recedes there is room.
+        let all =
+            || std::iter::once(Obstacle { outline: &wall, displaced: [[0.2, 0.0], [-0.2, 0.0]] });
+        assert_eq!(slide(all(), [0.3, 0.5], [-0.1, 0.5]), None);
+        let end = slide(all(), [0.3, 0.5], [-0.4, 0.5]).unwrap();
+        assert!((end[0] + 0.2).abs() < 1e-7, "{end:?}");
     }
 }

@@ -5,6 +5,7 @@
 
 use super::mesh::Mesh;
 use super::outline::{Outline, Point, edges};
+use super::parts::Parts;
 use super::shape::{GAUSS_3, GAUSS_3_WEIGHTS};
 use std::f64::consts::TAU;
 
@@ -35,8 +36,15 @@ pub struct OutlinePoint {
 impl Mesh {
     /// Points along the outlines of solids of any shape in a cell, where the fluid touches them.
     pub fn outline_points(&self, cell: usize) -> Vec<OutlinePoint> {
+        self.parts().map_or_else(Vec::new, |parts| self.outline_points_of(parts, cell))
+    }
+
+    /// The same for given solids.
+    pub(super) fn outline_points_of(&self, parts: &Parts, cell: usize) -> Vec<OutlinePoint> {
         let mut out = Vec::new();
-        let Some(parts) = self.parts().filter(|_| !self.solid[cell]) else { return out };
+        if self.solid[cell] {
+            return out;
+        }
         let [hx, hy] = self.cell_size(cell);
         let reach = 0.5 * hx.hypot(hy) * (1.0 + ON_LINE);
         let centre = self.cell_centre(cell);
@@ -166,11 +174,7 @@ mod tests {
 
     fn mesh(n: usize, outlines: &[Outline]) -> Mesh {
         let axis = || Axis::new((0..=n).map(|k| k as f64 / n as f64).collect(), false);
-        let solids = outlines.iter().map(|outline| Solid {
-            name: "solid".into(),
-            outline: outline.clone(),
-            no_slip: true,
-        });
+        let solids = outlines.iter().map(|o| Solid::at_rest("solid", o.clone(), true));
         Mesh::new(axis(), axis()).with_solids(solids.collect())
     }
 

@@ -1,6 +1,6 @@
 //! This module defines solids of any shape, and the parts of cells that they leave free.
 
-use super::outline::{Outline, Point};
+use super::outline::{Obstacle, Outline, Point};
 use super::shape::{NODES, Shape};
 use super::stream::Stream;
 use std::sync::Arc;
@@ -12,8 +12,22 @@ pub struct Solid {
     pub name: String,
     /// Its outline, in the plan's units.
     pub outline: Outline,
-    /// Whether the tangential velocity is zero along it too.
+    /// Whether the tangential velocity is that of the solid along it too.
     pub no_slip: bool,
+    /// Velocity, in the plan's units.
+    pub velocity: Point,
+}
+
+impl Solid {
+    /// A solid at rest.
+    pub fn at_rest(name: impl Into<String>, outline: Outline, no_slip: bool) -> Solid {
+        Solid { name: name.into(), outline, no_slip, velocity: [0.0; 2] }
+    }
+
+    /// Whether it moves.
+    pub fn moves(&self) -> bool {
+        self.velocity != [0.0; 2]
+    }
 }
 
 /// An integration point of the free part of a cell.
@@ -46,6 +60,10 @@ pub struct Part {
     /// Integral of `q N_a n_c` over the outline, with its normal `n` into the solid: the force of the
     /// pressure on the solid.
     pub outline: [[[f64; NODES]; 2]; 3],
+    /// Volume that moving solids take from it per time.
+    pub swept: f64,
+    /// Velocity of the solid that has most of the outline in it.
+    pub velocity: Point,
     /// Neighbours without solids, whose pressure has the slope of this one.
     pub beside: Vec<usize>,
     /// Streamfunction of the velocity in it, where a single wall crosses the cell.
@@ -80,6 +98,19 @@ impl Parts {
     /// Outlines of the solids.
     pub fn outlines(&self) -> impl Iterator<Item = &Outline> + Clone {
         self.solids.iter().map(|s| &s.outline)
+    }
+
+    /// Outlines with their displacements at two times after that of the outlines.
+    pub fn obstacles(&self, times: [f64; 2]) -> impl Iterator<Item = Obstacle<'_>> + Clone {
+        self.solids.iter().map(move |s| Obstacle {
+            outline: &s.outline,
+            displaced: times.map(|t| s.velocity.map(|v| t * v)),
+        })
+    }
+
+    /// Whether a solid moves.
+    pub fn move_on(&self) -> bool {
+        self.solids.iter().any(Solid::moves)
     }
 
     /// Whether a point is inside of a solid.

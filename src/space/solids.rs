@@ -63,16 +63,43 @@ impl Mesh {
         for cell in cut {
             let beside = self.free_neighbours(&parts, cell);
             let stream = parts.of(cell).and_then(|part| fit(&self, cell, part, &parts));
+            let (swept, velocity) =
+                if parts.move_on() { self.swept(&parts, cell) } else { Default::default() };
             if let Some(part) = &mut parts.cells[cell] {
                 (part.beside, part.stream) = (beside, stream.map(Box::new));
+                (part.swept, part.velocity) = (swept, velocity);
             }
         }
         self.parts = Some(Arc::new(parts));
         self
     }
 
+    /// Volume that moving solids take from the free part of a cell per time, `sum of W . S` over the
+    /// solids with velocity `W` and the integral `S` of the normal, away from the solid, over the outline
+    /// inside of the cell. All `S` together are exactly the free areas of the sides with their normals:
+    /// what rounding and corners leave belongs to the solid with most of the outline,
+    /// whose velocity is the second value.
+    fn swept(&self, parts: &Parts, cell: usize) -> (f64, Point) {
+        let Some(part) = parts.of(cell) else { return Default::default() };
+        let mut rest = [0, 1].map(|c| part.divergence[0][c].iter().sum::<f64>());
+        let mut area = vec![0.0; parts.solids.len()];
+        let mut swept = 0.0;
+        for p in self.outline_points_of(parts, cell) {
+            area[p.solid] += p.area;
+            for c in 0..2 {
+                rest[c] -= p.area * p.normal[c];
+                swept += p.area * p.normal[c] * parts.solids[p.solid].velocity[c];
+            }
+        }
+        let most = (0..area.len()).max_by(|&a, &b| area[a].total_cmp(&area[b]));
+        let most = most.filter(|&k| area[k] > 0.0).map(|k| &parts.solids[k]);
+        let nearest = || parts.nearest(self.cell_centre(cell)).map(|(solid, _)| solid);
+        let velocity = most.or_else(nearest).map_or([0.0; 2], |solid| solid.velocity);
+        (swept + rest[0] * velocity[0] + rest[1] * velocity[1], velocity)
+    }
+
     /// Rate at which the volume in the free part of a cell grows with the given nodal velocities,
-    /// `integral div u`.
+    /// `integral div u` and what solids take from it.
     pub fn volume_rate(&self, cell: usize, velocity: impl Fn(usize) -> Point) -> f64 {
         if self.solid[cell] {
             return 0.0;
@@ -80,7 +107,8 @@ impl Mesh {
         let u = self.cell_nodes(cell).map(velocity);
         if let Some(part) = self.part(cell) {
             let [x, y] = &part.divergence[0];
-            return (0..NODES).map(|a| x[a] * u[a][0] + y[a] * u[a][1]).sum();
+            let through: f64 = (0..NODES).map(|a| x[a] * u[a][0] + y[a] * u[a][1]).sum();
+            return through - part.swept;
         }
         const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
         let through = |side: usize| {
@@ -95,10 +123,16 @@ impl Mesh {
         (0..4).map(through).sum()
     }
 
-    /// Value at a node of a side (normal along `normal`) of a velocity that is given along the side. At a
+    /// Value at a node of a side (normal along `normal`) of component `c` of a velocity that is given along
+    /// the side. At a
     /// node inside of a solid it is the continuation of the values beside the solid, of
-    /// `velocity / distance` where the velocity vanishes on the solid.
-    pub fn continued(&self, node: usize, normal: usize, value: impl Fn(Point) -> f64) -> f64 {
+    /// `velocity / distance`, relative to the solid, where it vanishes on the solid.
+    pub fn continued(
+        &self,
+        node: usize,
+        (normal, c): (usize, usize),
+        value: impl Fn(Point) -> f64,
+    ) -> f64 {
         let at = self.node_position(node);
         let Some(parts) = self.parts() else { return value(at) };
         let (solid, inside) = match parts.nearest(at) {
@@ -122,11 +156,12 @@ impl Mesh {
         let t = d / (d - inside);
         let halfway = [0, 1].map(|c| free[c] + 0.5 * t * (at[c] - free[c]));
         let scale = |d: f64| if solid.no_slip { d } else { 1.0 };
-        let [first, second] =
-            [(free, d), (halfway, parts.distance(halfway))].map(|(p, d)| value(p) / scale(d));
+        let own = if solid.no_slip { solid.velocity[c] } else { 0.0 };
+        let [first, second] = [(free, d), (halfway, parts.distance(halfway))]
+            .map(|(p, d)| (value(p) - own) / scale(d));
         let slope = if t > NARROW { (second - first) / (0.5 * t) } else { 0.0 };
         let start = if t > NARROW { first } else { second };
-        (start + slope) * scale(inside)
+        own + (start + slope) * scale(inside)
     }
 
     /// A place in the free part of a cell: its centroid or the integration point nearest to it.
@@ -219,7 +254,17 @@ fn part(
     let outline = std::array::from_fn(|q| {
         [0, 1].map(|c| std::array::from_fn(|a| whole[q][c][a] - divergence[q][c][a]))
     });
-    Part { fraction, points, divergence, outline, beside: vec![], stream: None, unresolved }
+    Part {
+        fraction,
+        points,
+        divergence,
+        outline,
+        swept: 0.0,
+        velocity: [0.0; 2],
+        beside: vec![],
+        stream: None,
+        unresolved,
+    }
 }
 
 #[cfg(test)]
@@ -240,11 +285,7 @@ mod tests {
     #[test]
     fn free_volumes_are_exact_for_straight_walls_and_of_second_order_for_circles() {
         let triangle = Outline::polygon(vec![[-1.0, -0.2], [2.0, 0.7], [2.0, -3.0], [-1.0, -3.0]]);
-        let solid = |outline: &Outline| Solid {
-            name: "solid".into(),
-            outline: outline.clone(),
-            no_slip: true,
-        };
+        let solid = |outline: &Outline| Solid::at_rest("solid", outline.clone(), true);
         let below = |x: f64| -0.2 + 0.3 * (x + 1.0);
         for n in [1, 3, 7] {
             let m = mesh(n).with_solids(vec![solid(&triangle)]);
@@ -261,7 +302,7 @@ mod tests {
     #[test]
     fn nine_positive_weights_integrate_biquadratic_functions() {
         let outline = Outline::Circle { centre: [0.4, 0.5], radius: 0.35 };
-        let m = mesh(5).with_solids(vec![Solid { name: "solid".into(), outline, no_slip: true }]);
+        let m = mesh(5).with_solids(vec![Solid::at_rest("solid", outline, true)]);
         let parts = m.parts().unwrap();
         assert!(parts.all().count() > 8);
         for (cell, part) in parts.all() {

@@ -3,7 +3,7 @@
 //! ```text
 //! psi = d^m phi(x, y),   u = (d psi/dy, -d psi/dx)
 //! ```
-//! with the distance `d` from the solid, `m = 2` where the velocity vanishes on it and 1 where it
+//! relative to the velocity of the solid, with the distance `d` from the solid, `m = 2` where the velocity vanishes on it and 1 where it
 //! slips, and a quadratic `phi`. Such a velocity has no divergence and never leads into the solid. The
 //! velocity of the solver has no divergence in the mean of a cell only: where it leads towards a wall
 //! or away from it with a velocity proportional to the distance, points accumulate or are missing.
@@ -24,6 +24,8 @@ pub type Form = [f64; 2 * NODES];
 pub struct Stream {
     /// Coefficients of `phi` as linear forms.
     pub(super) map: [Form; TERMS],
+    /// Velocity of the solid.
+    pub(super) velocity: Point,
     /// The power `m`.
     pub(super) power: i32,
     /// Centroid of the part, in the plan's units.
@@ -40,14 +42,16 @@ impl Stream {
     /// The coefficients for the nodal velocities of the cell.
     pub fn flow(&self, nodal: &[[f64; 2]; NODES]) -> StreamFlow {
         let of = |form: &Form| -> f64 {
-            form.iter().enumerate().map(|(j, f)| f * nodal[j % NODES][j / NODES]).sum()
+            let relative = |j: usize| nodal[j % NODES][j / NODES] - self.velocity[j / NODES];
+            form.iter().enumerate().map(|(j, f)| f * relative(j)).sum()
         };
         StreamFlow(SVector::from_fn(|k, _| of(&self.map[k])))
     }
 
     /// Velocity at a point with the distance `d` from the solid, along the unit normal `n`.
     pub fn velocity(&self, flow: &StreamFlow, p: Point, d: f64, n: Point) -> Point {
-        self.rows(p, d.max(0.0), n).map(|row| row.dot(&flow.0))
+        let [x, y] = self.rows(p, d.max(0.0), n).map(|row| row.dot(&flow.0));
+        [x + self.velocity[0], y + self.velocity[1]]
     }
 
     /// The terms of `phi` at a point.

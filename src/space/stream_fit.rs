@@ -24,11 +24,12 @@ pub fn fit(mesh: &Mesh, cell: usize, part: &Part, parts: &Parts) -> Option<Strea
     }
     let [hx, hy] = mesh.cell_size(cell);
     let arc = arc(mesh, cell, parts)?;
-    let no_slip = parts.nearest(mesh.cell_centre(cell))?.0.no_slip;
+    let solid = parts.nearest(mesh.cell_centre(cell))?.0;
     let centre = mesh.from_reference(cell, part.centroid());
     let mut stream = Stream {
         map: [[0.0; 2 * NODES]; TERMS],
-        power: if no_slip { 2 } else { 1 },
+        power: if solid.no_slip { 2 } else { 1 },
+        velocity: solid.velocity,
         centre,
         size: 0.5 * (hx + hy),
     };
@@ -122,7 +123,7 @@ mod tests {
         let axis = || Axis::new((0..=6).map(|k| f64::from(k) / 6.0).collect(), false);
         let corners = vec![[-1.0, -0.2], [2.0, 1.1], [2.0, -3.0], [-1.0, -3.0]];
         let outline = Outline::polygon(corners);
-        let solid = Solid { name: "wall".into(), outline: outline.clone(), no_slip: true };
+        let solid = Solid::at_rest("wall", outline.clone(), true);
         let mesh = Mesh::new(axis(), axis()).with_solids(vec![solid]);
         let parts = mesh.parts().unwrap();
         let along = [3.0 / 3.0f64.hypot(1.3), 1.3 / 3.0f64.hypot(1.3)];

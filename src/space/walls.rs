@@ -61,6 +61,11 @@ impl Enclosure {
     /// Follows the straight path from `p0` (inside the mesh) to `p1`. The result is not wrapped
     /// around periodic sides.
     pub fn follow(&self, mesh: &Mesh, p0: [f64; 2], p1: [f64; 2]) -> Landing {
+        self.follow_during(mesh, [p0, p1], [0.0; 2])
+    }
+
+    /// The same for a path that begins and ends at these times after those of the solids of the mesh.
+    pub fn follow_during(&self, mesh: &Mesh, [p0, p1]: [[f64; 2]; 2], times: [f64; 2]) -> Landing {
         let mut to = p1;
         let mut held = false;
         for (c, axis) in [&mesh.x, &mesh.y].into_iter().enumerate() {
@@ -89,7 +94,7 @@ impl Enclosure {
             held = true;
         }
         if let Some(parts) = mesh.parts()
-            && let Some(end) = slide(parts.outlines(), p0, to)
+            && let Some(end) = slide(parts.obstacles(times), p0, to)
         {
             (to, held) = (end, true);
             for (c, axis) in [&mesh.x, &mesh.y].into_iter().enumerate() {

@@ -10,6 +10,7 @@ mod inertia;
 mod inflow;
 mod laws;
 mod measure;
+mod moving;
 mod openings;
 mod order;
 mod patch;

@@ -45,6 +45,8 @@ fn slip_lengths_hold_along_slanted_walls() {
 #[test]
 fn slip_lengths_hold_along_circles() {
     for b in [0.01, 0.1, 1.0] {
+        let all = [16, 32, 64, 128].map(|n| slipping_circle(b).errors(n, &[]).unwrap().velocity);
+        eprintln!("{b}: {all:?}");
         let [coarse, fine, order] = order(&slipping_circle(b));
         eprintln!("{b}: {coarse:.2e} {fine:.2e} {order:.2}");
         assert!(order > 2.0 && fine < 1e-3, "{b}: {coarse:.2e} {fine:.2e} {order:.2}");
@@ -211,6 +213,11 @@ fn a_block_of_grains_rubs_on_a_slanted_plane() {
         let f = run.row().forces[0];
         let (normal, along) = (sin * f.x - cos * f.y, -cos * f.x - sin * f.y);
         eprintln!("{} {normal} {along} {}", run.row().time, along / normal);
+        for k in 0..40 {
+            let s = 0.2 + 0.04 * k as f64;
+            let p = [s * cos - 0.01 * sin, s * sin + 0.01 * cos];
+            eprintln!("   {s:.2} {:?} {:.1}", run.velocity_at(p), run.pressure_at(p));
+        }
         assert!((along / normal / 0.3 - 1.0).abs() < 1e-2, "{along} {normal}");
         run.step().unwrap();
     }

@@ -178,6 +178,7 @@ pub(super) fn mesh(
         name: s.name.clone(),
         outline: s.outline.in_units(units.length),
         no_slip: s.kind == WallKind::NoSlip,
+        velocity: s.velocity.map(|v| v / units.velocity()),
     });
     let mesh = mesh.with_solids(solids.collect());
     if mesh.solid.iter().all(|&s| s) {

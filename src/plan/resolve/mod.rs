@@ -11,6 +11,7 @@ mod materials;
 mod mesh;
 mod null_spaces;
 mod outlines;
+mod posed;
 mod pressure;
 mod recording;
 mod regions;
@@ -24,9 +25,10 @@ mod time;
 pub(super) mod values;
 pub(super) mod walls;
 
+pub(super) use posed::posed;
 pub use schedule::resolve;
 
-use super::{EffectSet, InitialFields, Method, Plan, Warning};
+use super::{EffectSet, InitialFields, Method, Plan, Pose, Warning};
 use super::{boundary, forces};
 use crate::scene::{Field, FieldFn, Scene, SceneError, Scope, WallKind, is_folder_name};
 use materials::{SiMatter, thin_fluid};
@@ -35,8 +37,9 @@ use std::sync::Arc;
 use values::{Result, finite_range, middle, positive, ranges};
 use walls::{SiBlock, Walls};
 
-/// Resolves a scene as if its schedule were empty.
-fn without_schedule(scene: &Scene) -> Result<Plan> {
+/// Resolves a scene as if its schedule were empty. `poses`: where the blocks are that move, if not at
+/// their start.
+fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
     if !is_folder_name(&scene.name) {
         return Err(SceneError::of_key(
             "name",
@@ -79,7 +82,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
     let mut state = si.matter(&units);
     warnings.extend(si.warnings.iter().cloned());
 
-    let mut walls = Walls::new(scene, scope, domain)?;
+    let mut walls = Walls::new(scene, scope, domain, poses)?;
+    posed::check(scene, &walls.moving)?;
     let slips = slip::Slips::new(scene, scope)?;
     let supports = forces::names(&walls);
     let (gauges, wanted) = gauges::gauges(scene, scope, domain, &supports)?;
@@ -182,6 +186,8 @@ fn without_schedule(scene: &Scene) -> Result<Plan> {
         units,
         enclosure,
         boundary,
+        moving: walls.moving,
+        poses: walls.poses,
         pressure_reference,
         state,
         changes: vec![],

@@ -10,7 +10,7 @@ use crate::space::mesh::{Axis, Mesh};
 
 /// Checks a scene and makes its plan.
 pub fn resolve(scene: &Scene) -> Result<Plan> {
-    let mut plan = super::without_schedule(scene)?;
+    let mut plan = super::without_schedule(scene, None)?;
     let mut current = scene.clone();
     current.schedule.clear();
     for (index, change) in scene.schedule.iter().enumerate() {
@@ -27,7 +27,7 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
                 ));
             }
         };
-        let other = super::without_schedule(&current)?;
+        let other = super::without_schedule(&current, None)?;
         if let Some(what) = plan.beyond_matter(&other) {
             return Err(SceneError::of_key(
                 format!("schedule[{index}]"),

@@ -2,8 +2,9 @@
 //! edges (lips) of apertures.
 
 use super::outlines;
+use super::posed::rests;
 use super::values::{Result, point, positive, ranges};
-use crate::plan::{BoundaryPlan, Units};
+use crate::plan::{BoundaryPlan, Moving, Pose, Units};
 use crate::scene::{Block, Quantity, Scene, SceneError, Scope, SolidShape, Wall, WallKind};
 use crate::space::mesh::Mesh;
 use crate::space::outline::Outline;
@@ -17,6 +18,9 @@ pub(in crate::plan) struct Walls {
     pub(in crate::plan) blocks: Vec<SiBlock>,
     /// Solids of any shape.
     pub(in crate::plan) solids: Vec<SiSolid>,
+    /// Blocks that move, and where they are.
+    pub(in crate::plan) moving: Vec<Moving>,
+    pub(in crate::plan) poses: Vec<Pose>,
 }
 
 /// A block along mesh lines in SI coordinates.
@@ -38,6 +42,8 @@ pub(in crate::plan) struct SiSolid {
     pub(in crate::plan) name: String,
     pub(in crate::plan) outline: Outline,
     pub(in crate::plan) kind: WallKind,
+    /// Velocity, m/s.
+    pub(in crate::plan) velocity: [f64; 2],
 }
 
 /// A wall in SI coordinates.
@@ -98,6 +104,7 @@ impl Walls {
         scene: &Scene,
         scope: &Scope,
         domain: [[f64; 2]; 2],
+        poses: Option<&[Pose]>,
     ) -> Result<Walls> {
         let mut errors = Vec::new();
         let mut walls = Vec::new();
@@ -128,7 +135,33 @@ impl Walls {
             }
         }
         let mut blocks = Vec::new();
+        let (mut moving, mut current) = (Vec::new(), Vec::new());
         for (index, b) in scene.blocks.iter().enumerate() {
+            match motion(b, scope) {
+                Ok(None) => {}
+                Ok(Some(own)) => {
+                    let known = poses.and_then(|poses| poses.get(moving.len()));
+                    let pose = known.copied().unwrap_or_else(|| Pose::at_start(&own));
+                    match outline_of(b, scope) {
+                        Ok(outline) => solids.push(SiSolid {
+                            index,
+                            wall: false,
+                            name: b.name.clone(),
+                            outline: outline.moved(pose.displacement),
+                            kind: b.kind.unwrap_or_default(),
+                            velocity: pose.velocity,
+                        }),
+                        Err(e) => errors.push(e),
+                    }
+                    moving.push(own);
+                    current.push(pose);
+                    continue;
+                }
+                Err(e) => {
+                    errors.push(e);
+                    continue;
+                }
+            }
             match resolved((index, b), scope, domain) {
                 Ok(Resolved::Aligned(block)) => blocks.push(block),
                 Ok(Resolved::Solid(solid)) => solids.push(solid),
@@ -136,7 +169,7 @@ impl Walls {
             }
         }
         SceneError::join(errors)?;
-        Ok(Walls { walls, blocks, solids })
+        Ok(Walls { walls, blocks, solids, moving, poses: current })
     }
 
     /// The lips of apertures: ends of walls that face each other across a gap. (Additional grading
@@ -198,6 +231,51 @@ impl Walls {
     }
 }
 
+/// How a block moves, if it does.
+fn motion(b: &Block, scope: &Scope) -> Result<Option<Moving>> {
+    let Some([x, y]) = &b.velocity else { return Ok(None) };
+    let velocity = [x.in_time(scope)?, y.in_time(scope)?];
+    for (v, q) in velocity.iter().zip([x, y]) {
+        if !v.at(0.0, 0.0).is_finite() {
+            return Err(SceneError::at(
+                q,
+                format!("block `{}`: its velocity at t = 0 is {}", b.name, v.at(0.0, 0.0)),
+                "give a velocity that is finite at all times of the run",
+            ));
+        }
+    }
+    Ok((!rests(&velocity)).then(|| Moving { name: b.name.clone(), velocity }))
+}
+
+/// Outline of a block that moves.
+fn outline_of(b: &Block, scope: &Scope) -> Result<Outline> {
+    let what = format!("block `{}`", b.name);
+    let (x, y) = match (&b.x, &b.y, &b.shape) {
+        (Some(x), Some(y), None) | (None, None, Some(SolidShape::Rectangle { x, y })) => (x, y),
+        (None, None, Some(SolidShape::Polygon(corners))) => {
+            return outlines::polygon(corners, &what, scope);
+        }
+        (None, None, Some(SolidShape::Circle { centre, radius })) => {
+            return outlines::circle(centre, radius, &what, scope);
+        }
+        _ => return Err(without_shape(&what)),
+    };
+    let [[left, right], [low, high]] = ranges(x, y, scope)?;
+    if left >= right || low >= high {
+        let error = format!("{what} is empty");
+        return Err(SceneError::at(&x[0], error, "give [low, high] with low below high"));
+    }
+    Ok(Outline::polygon(vec![[left, low], [right, low], [right, high], [left, high]]))
+}
+
+fn without_shape(what: &str) -> SceneError {
+    SceneError::of_key(
+        "blocks",
+        format!("{what} needs either x and y or a shape"),
+        "give x = [low, high] and y = [low, high], or shape.polygon, or shape.circle",
+    )
+}
+
 /// A resolved block.
 enum Resolved {
     Aligned(SiBlock),
@@ -209,7 +287,8 @@ fn resolved((index, b): (usize, &Block), scope: &Scope, domain: [[f64; 2]; 2]) -
     let (name, kind) = (b.name.clone(), b.kind.unwrap_or_default());
     let solid = |outline, place: &Quantity| {
         outlines::touches(&outline, domain, place, &what)?;
-        Ok(Resolved::Solid(SiSolid { index, wall: false, name: name.clone(), outline, kind }))
+        let (name, velocity) = (name.clone(), [0.0; 2]);
+        Ok(Resolved::Solid(SiSolid { index, wall: false, name, outline, kind, velocity }))
     };
     let (x, y) = match (&b.x, &b.y, &b.shape) {
         (Some(x), Some(y), None) | (None, None, Some(SolidShape::Rectangle { x, y })) => (x, y),
@@ -220,13 +299,7 @@ fn resolved((index, b): (usize, &Block), scope: &Scope, domain: [[f64; 2]; 2]) -
         (None, None, Some(SolidShape::Circle { centre, radius })) => {
             return solid(outlines::circle(centre, radius, &what, scope)?, &centre[0]);
         }
-        _ => {
-            return Err(SceneError::of_key(
-                "blocks",
-                format!("{what} needs either x and y or a shape"),
-                "give x = [low, high] and y = [low, high], or shape.polygon, or shape.circle",
-            ));
-        }
+        _ => return Err(without_shape(&what)),
     };
     let range = ranges(x, y, scope)?;
     for (c, r) in range.into_iter().enumerate() {
@@ -273,6 +346,7 @@ fn thick(
         name: w.name.clone(),
         outline,
         kind: w.kind.unwrap_or_default(),
+        velocity: [0.0; 2],
     })
 }
 

@@ -25,11 +25,12 @@ const PLOTS_AT_ONCE: usize = 4;
 const FLOW: [&str; 2] = ["+ $origin/world/**", "- $origin/world/fields/**"];
 
 /// Content of a view of a field.
-fn field_contents(paths: &Paths, name: &str) -> [String; 4] {
+fn field_contents(paths: &Paths, name: &str) -> [String; 5] {
     [
         format!("+ {}/**", paths.field(name)),
         "+ $origin/world".to_owned(),
         "+ $origin/world/walls".to_owned(),
+        "+ $origin/world/moving".to_owned(),
         "+ $origin/world/gauges".to_owned(),
     ]
 }

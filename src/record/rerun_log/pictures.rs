@@ -55,6 +55,15 @@ impl RerunLog {
                 .with_radii([Radius::new_ui_points(1.2)])
                 .with_draw_order(depth::GLYPHS),
         )?;
+        if !snapshot.moving.is_empty() {
+            self.rec.log(
+                self.paths.at("world/moving"),
+                &archetypes::LineStrips2D::new(snapshot.moving.iter().map(Vec::as_slice))
+                    .with_colors([rgb(WALL)])
+                    .with_radii([Radius::new_ui_points(2.5)])
+                    .with_draw_order(depth::WALLS),
+            )?;
+        }
         for field in &snapshot.fields {
             self.field(field)?;
             self.values(field)?;

@@ -158,6 +158,11 @@ impl Recorded {
         self.strips("dye")
     }
 
+    /// The outlines of the solids that move in each snapshot, with its time (s), in order.
+    pub fn moving(&self) -> Vec<(f64, Vec<Vec<[f32; 2]>>)> {
+        self.strips("moving")
+    }
+
     /// The director strokes of each snapshot, each given by its two end points, with its time (s),
     /// in order.
     pub fn glyphs(&self) -> Vec<(f64, Vec<[[f32; 2]; 2]>)> {

@@ -12,7 +12,7 @@ pub(super) struct Reader<'t, 'a> {
     pub(super) depth: usize,
     pub(super) names: &'a dyn Fn(&str) -> Option<f64>,
     pub(super) known: &'a dyn Fn() -> Vec<&'a str>,
-    pub(super) coordinates: bool,
+    pub(super) variables: Variables,
     pub(super) uses: [bool; 2],
 }
 
@@ -115,8 +115,8 @@ impl<'t> Reader<'t, '_> {
         if rest[name.len()..].trim_start().starts_with('(') {
             return self.call(name);
         }
-        let value = if self.coordinates && (name == "x" || name == "y") {
-            self.uses[usize::from(name == "y")] = true;
+        let value = if let Some(k) = self.variables.iter().position(|v| *v == name) {
+            self.uses[k] = true;
             name.to_owned()
         } else if let Some(value) = CONSTANTS.iter().find(|c| c.0 == name).map(|c| c.1) {
             literal(value)
@@ -187,9 +187,7 @@ impl<'t> Reader<'t, '_> {
             (format!("`{name}` is a function"), format!("write {name}(...)"))
         } else {
             let mut known = (self.known)();
-            if self.coordinates {
-                known.extend(["x", "y"]);
-            }
+            known.extend(self.variables);
             known.push("pi");
             (format!("unknown name `{name}`"), suggestion(name, "known names are", &known))
         };

@@ -10,7 +10,7 @@
 //!
 //! The discontinuous linear pressure is eliminated cell by cell; see
 //! [`stokes`](crate::solve::stokes). In a cell with a solid of any shape only the constant is unknown;
-//! see [`embedding`](crate::space::embedding).
+//! see [`embedding`](crate::space::embedding). Its free part shrinks by what moving solids take from it.
 
 use crate::solve::element::{Matrix, Nodal};
 use crate::space::mesh::Mesh;
@@ -119,6 +119,12 @@ impl<'a> Divergence<'a> {
             }
         }
         std::array::from_fn(|q| self.x_scale * sum[0][q] + self.y_scale * sum[1][q])
+    }
+
+    /// Volume that moving solids take from the cell per time: a flow without divergence has `B u` equal
+    /// to it.
+    pub fn swept(&self) -> f64 {
+        self.part.map_or(0.0, |part| part.swept)
     }
 
     /// `B u` for a pressure that is not an unknown.

@@ -1,0 +1,154 @@
+//! Solids that move through the mesh: swept volumes, exact flows beside them, and runs in which nothing is
+//! lost.
+
+use crate::scene;
+use grainscope::sim::Run;
+
+/// A channel of 2 m x 1 m with a block in it.
+fn channel(sides: &str, block: &str) -> String {
+    format!(
+        "schema = 1\nname = \"channel\"\n[domain]\nx = [0, 2]\ny = [0, 1]\n[accuracy]\ncells = 8\n\
+         [time]\nend = 10\n[materials.fluid]\nshear_viscosity = 2\n[[regions]]\nmaterial = \"fluid\"\n\
+         {sides}\n[[blocks]]\nname = \"block\"\n{block}\n"
+    )
+}
+
+const OPEN: &str = "[boundaries]\nright.kind = \"outflow\"\nleft.kind = \"free_slip\"\n";
+
+/// Outflow through the right side, m2/s, by Simpson's rule in each cell, which is exact.
+fn outflow(run: &dyn Run) -> f64 {
+    let n = 8;
+    let at = |k: usize, t: f64| run.velocity_at([2.0, (k as f64 + t) / f64::from(n)])[0];
+    let cell = |k: usize| (at(k, 1e-9) + 4.0 * at(k, 0.5) + at(k, 1.0 - 1e-9)) / 6.0;
+    (0..n as usize).map(cell).sum::<f64>() / f64::from(n)
+}
+
+fn volume(run: &dyn Run) -> f64 {
+    run.particles().volume.iter().sum::<f64>() * run.plan().units.length.powi(2)
+}
+
+/// Particles inside of a solid.
+fn inside(run: &dyn Run) -> usize {
+    let mesh = &run.plan().mesh;
+    run.particles().position.iter().filter(|p| mesh.is_solid_at(**p)).count()
+}
+
+#[test]
+fn a_piston_pushes_out_what_it_sweeps() {
+    let piston =
+        "shape.polygon = [[-2, -1], [0.33, -1], [0.33, 2], [-2, 2]]\nvelocity = [0.1, 0]\n";
+    for kind in ["free_slip", "no_slip"] {
+        let text = channel(OPEN, &format!("{piston}kind = \"{kind}\"\n"));
+        let mut run = scene(&text, &["time.max_step=0.37"]);
+        let first = volume(run.as_ref());
+        for _ in 0..8 {
+            let out = outflow(run.as_ref());
+            assert!((out / 0.1 - 1.0).abs() < 1e-10, "{kind}: {out}");
+            run.step().unwrap();
+            assert_eq!(inside(run.as_ref()), 0);
+            let row = run.row();
+            assert!(row.power_error < 1e-8, "{kind}: {}", row.power_error);
+            // What leaves with particles is what is swept, to the volume of some particles.
+            let swept = 0.1 * row.time;
+            let lost = first - volume(run.as_ref());
+            eprintln!("{kind} {} {lost} {swept} {}", row.time, row.volume_error);
+            assert!((lost - row.volume_out).abs() < 1e-9, "{lost} {}", row.volume_out);
+            assert!((lost - swept).abs() < 0.02, "{kind}: {lost} {swept}");
+        }
+        assert!(run.row().time > 0.7, "{}", run.row().time);
+    }
+}
+
+#[test]
+fn a_gate_drags_the_fluid_beside_it() {
+    // Plane Couette flow between a plate that rises through the open ends and a wall at rest.
+    let sides = "[boundaries]\nright.kind = \"no_slip\"\nleft.kind = \"no_slip\"\nbottom.kind = \"outflow\"\n\
+                 top.kind = \"outflow\"\n";
+    let plate = "shape.polygon = [[-1, -9], [0.53, -9], [0.53, 9], [-1, 9]]\nvelocity = [0, 0.3]\n\
+                 kind = \"no_slip\"\n[[gauges]]\nname = \"plate\"\non = \"block\"\n";
+    let mut run = scene(&channel(sides, plate), &[]);
+    for _ in 0..3 {
+        for k in 0..20 {
+            let x = 0.55 + 0.07 * f64::from(k);
+            let exact = 0.3 * (2.0 - x) / (2.0 - 0.53);
+            let [u, v, _] = run.velocity_at([x, 0.5]);
+            assert!(u.abs() < 1e-9 && (v - exact).abs() < 1e-7, "{x}: {u} {v} {exact}");
+        }
+        // The force on the plate, and the power that it gives.
+        let force = -2.0 * 0.3 / (2.0 - 0.53);
+        let row = run.row();
+        assert!((row.forces[0].y / force - 1.0).abs() < 1e-6, "{} {force}", row.forces[0].y);
+        assert!((row.power_in / (-0.3 * force) - 1.0).abs() < 1e-6, "{}", row.power_in);
+        assert!((row.dissipation / row.power_in - 1.0).abs() < 1e-8);
+        run.step().unwrap();
+    }
+}
+
+#[test]
+fn a_stone_that_moves_through_fluid_displaces_none() {
+    let sides = "[boundaries]\nright.kind = \"no_slip\"\nleft.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
+                 top.kind = \"no_slip\"\n";
+    for kind in ["no_slip", "free_slip"] {
+        let stone = format!(
+            "shape.circle = {{ centre = [0.6, 0.5], radius = 0.22 }}\nkind = \"{kind}\"\n\
+             velocity = [\"0.2*(t < 2)\", \"0.05*sin(3*t)\"]\n"
+        );
+        let mut run = scene(&channel(sides, &stone), &["time.max_step=0.2"]);
+        let first = volume(run.as_ref());
+        let free = 2.0 - std::f64::consts::PI * 0.22f64.powi(2);
+        assert!((first / free - 1.0).abs() < 1e-3);
+        for _ in 0..20 {
+            run.step().unwrap();
+            assert_eq!(inside(run.as_ref()), 0);
+            assert!((volume(run.as_ref()) / first - 1.0).abs() < 1e-12);
+            let row = run.row();
+            eprintln!(
+                "{kind} {} {} {} {}",
+                row.time, row.volume_error, row.power_error, row.max_speed
+            );
+            assert!(row.power_error < 1e-8, "{}", row.power_error);
+            assert!(row.volume_error < 0.5, "{}", row.volume_error);
+        }
+        assert!(run.row().time > 2.0, "{}", run.row().time);
+    }
+}
+
+#[test]
+fn a_run_with_a_block_that_moves_resumes_bit_for_bit() {
+    let piston = "shape.polygon = [[-2, -1], [0.33, -1], [0.33, 2], [-2, 2]]\n\
+                  velocity = [\"0.1*(1 + sin(t))\", 0]\n";
+    let text = channel(OPEN, piston);
+    let mut run = scene(&text, &[]);
+    run.step().unwrap();
+    run.step().unwrap();
+    let state = run.state();
+    run.step().unwrap();
+    let mut other = scene(&text, &[]);
+    other.restore(&state).unwrap();
+    other.step().unwrap();
+    assert_eq!(run.state_hash(), other.state_hash());
+    assert_eq!(run.row().power_in.to_bits(), other.row().power_in.to_bits());
+}
+
+#[test]
+fn a_block_that_closes_a_chamber_is_refused_when_it_does() {
+    // The piston passes the mouth of the side channel at x = 1 and then closes the chamber behind it.
+    let sides = "[boundaries]\nright.kind = \"free_slip\"\nleft.kind = \"free_slip\"\nbottom.kind = \
+                 \"free_slip\"\ntop.kind = \"free_slip\"\n[[boundaries.top.parts]]\nfrom = 1\nto = 1.25\n\
+                 kind = \"outflow\"\n";
+    let piston =
+        "shape.polygon = [[-2, -1], [0.83, -1], [0.83, 2], [-2, 2]]\nvelocity = [0.1, 0]\n";
+    let mut run = scene(&channel(sides, piston), &["time.max_step=0.5"]);
+    let error = loop {
+        match run.step() {
+            Ok(()) => assert!(run.row().time < 5.0),
+            Err(error) => break error,
+        }
+    };
+    let said = error.to_string();
+    eprintln!("{said} {}", run.row().time);
+    assert!(said.contains("encloses incompressible material"), "{said}");
+    assert!(error.remedy().contains("stop the block"), "{}", error.remedy());
+    // The mouth is closed when the piston has moved by 0.42 m.
+    assert!((run.row().time - 4.2).abs() < 0.6, "{}", run.row().time);
+}
