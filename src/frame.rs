@@ -36,8 +36,42 @@ pub struct Snapshot {
     pub arrows: Option<Arrows>,
     /// Isolines of fields.
     pub isolines: Vec<Isoline>,
+    /// Stresses along surfaces whose forces are measured.
+    pub stresses: Vec<SurfaceStress>,
     /// Closed outlines of the solids that move (m).
     pub moving: Vec<Vec<[f32; 2]>>,
+}
+
+/// Stresses of the materials along the surface of a side, a wall or a block.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SurfaceStress {
+    /// Name of the gauge of its force.
+    pub name: String,
+    /// Places on it, in the order of their position along it.
+    pub points: Vec<SurfacePoint>,
+}
+
+/// Stress of the materials at a place on a surface.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SurfacePoint {
+    /// Position along the surface (m).
+    pub along: f32,
+    /// Position (m).
+    pub at: [f32; 2],
+    /// Unit normal into the material.
+    pub normal: [f32; 2],
+    /// Normal stress on the surface (Pa); positive where the material presses on it.
+    pub pressing: f32,
+    /// Shear stress on the surface (Pa), along the normal turned counter-clockwise by a right angle.
+    pub shear: f32,
+}
+
+impl SurfacePoint {
+    /// Force per area on the surface (Pa).
+    pub fn traction(&self) -> [f32; 2] {
+        let [x, y] = self.normal;
+        [-self.pressing * x - self.shear * y, -self.pressing * y + self.shear * x]
+    }
 }
 
 /// Particles at one instant. Their number may differ between pictures.

@@ -1,6 +1,7 @@
 //! This module writes Parquet tables: particles and fields of all frames, and the series.
 
 use super::{ExportError, Frames, Instant};
+use crate::frame::SurfacePoint;
 use crate::record::replace::{self, Kind};
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type};
@@ -23,7 +24,7 @@ enum Column {
 /// Rows of a table that are written together: named columns of the same length.
 type Group = Vec<(String, Column)>;
 
-/// Writes `particles.parquet`, `fields.parquet` and `series.parquet`; the first two have the columns
+/// Writes `particles.parquet`, `fields.parquet`, `stresses.parquet` and `series.parquet`; all but the last have the columns
 /// `frame` and `time` and one row group per frame. Returns the number of files.
 pub(super) fn write(frames: &Frames, folder: &Path) -> Result<usize, ExportError> {
     let of = |group: &dyn Fn(usize, &Instant) -> Option<Group>| -> Vec<Group> {
@@ -37,6 +38,7 @@ pub(super) fn write(frames: &Frames, folder: &Path) -> Result<usize, ExportError
     let tables = [
         ("particles", of(&|n, i| particles(n, i, &frames.materials))),
         ("fields", of(&fields)),
+        ("stresses", of(&stresses)),
         ("series", series.collect()),
     ];
     let mut files = 0;
@@ -80,6 +82,29 @@ fn fields(n: usize, instant: &Instant) -> Option<Group> {
     }
     let values = |f: &crate::frame::GridField| (f.name.clone(), Column::Single(f.values.clone()));
     group.extend(instant.fields.iter().map(values));
+    Some(group)
+}
+
+fn stresses(n: usize, instant: &Instant) -> Option<Group> {
+    instant.stresses.first()?;
+    let points = || instant.stresses.iter().flat_map(|s| &s.points);
+    let mut group = stamp(n, instant, points().count());
+    let names: Vec<String> = instant.stresses.iter().map(|s| s.name.clone()).collect();
+    let indices = instant.stresses.iter().enumerate();
+    let indices = indices.flat_map(|(k, s)| vec![k as u16; s.points.len()]);
+    group.push(("surface".into(), Column::Text(indices.collect(), names)));
+    let columns: [(&str, fn(&SurfacePoint) -> f32); 7] = [
+        ("along", |p| p.along),
+        ("x", |p| p.at[0]),
+        ("y", |p| p.at[1]),
+        ("normal_x", |p| p.normal[0]),
+        ("normal_y", |p| p.normal[1]),
+        ("normal_stress", |p| p.pressing),
+        ("shear_stress", |p| p.shear),
+    ];
+    for (name, of) in columns {
+        group.push((name.into(), Column::Single(points().map(of).collect())));
+    }
     Some(group)
 }
 

@@ -6,7 +6,7 @@ mod columns;
 mod tables;
 mod vtu;
 
-use crate::frame::{GridField, ParticleSnapshot};
+use crate::frame::{GridField, ParticleSnapshot, SurfaceStress};
 use crate::record::replace::{self, Kind, ReplaceError};
 use crate::results::table::Table;
 use crate::results::{Member, ResultsError, SAME_TIME};
@@ -66,6 +66,8 @@ pub struct Instant {
     pub particles: Option<ParticleSnapshot>,
     /// Fields, all on the grid of the first one.
     pub fields: Vec<GridField>,
+    /// Stresses along surfaces.
+    pub stresses: Vec<SurfaceStress>,
 }
 
 /// All pictures of a run.
@@ -101,6 +103,9 @@ pub fn read(run: &Path) -> Result<Frames, ExportError> {
             None => field,
         };
         fields.push(alike);
+    }
+    for (time, surface) in recorded.stresses() {
+        frames.at(time).stresses.push(surface);
     }
     if frames.instants.is_empty() {
         return Err(ExportError::NoPictures(run.to_owned()));

@@ -4,15 +4,19 @@ use super::{ExportError, Frames, Instant, write_file};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes `particles_<n>.csv` and `fields_<n>.csv`, and `frames.csv` with their times. Returns the
+/// Writes `particles_<n>.csv`, `fields_<n>.csv` and `stresses_<n>.csv`, and `frames.csv` with their times. Returns the
 /// number of files.
 pub(super) fn write(frames: &Frames, folder: &Path) -> Result<usize, ExportError> {
     let mut table = String::from("frame,time\n");
     let mut files = 1;
     for (n, instant) in frames.instants.iter().enumerate() {
         let _ = writeln!(table, "{n},{}", instant.time_s);
-        let both = [("particles", particles(instant, frames)), ("fields", fields(instant))];
-        for (name, text) in both.into_iter().filter_map(|(name, text)| Some((name, text?))) {
+        let all = [
+            ("particles", particles(instant, frames)),
+            ("fields", fields(instant)),
+            ("stresses", stresses(instant)),
+        ];
+        for (name, text) in all.into_iter().filter_map(|(name, text)| Some((name, text?))) {
             write_file(folder.join(format!("{name}_{n:05}.csv")), text)?;
             files += 1;
         }
@@ -28,6 +32,21 @@ fn particles(instant: &Instant, frames: &Frames) -> Option<String> {
     for ([x, y], class) in particles.positions.iter().zip(&particles.class) {
         let name = frames.materials.get(usize::from(*class)).map_or("", String::as_str);
         let _ = writeln!(text, "{x},{y},{name}");
+    }
+    Some(text)
+}
+
+/// Stresses along surfaces, one row for each place: position along the surface and in space (m), normal and
+/// shear stress (Pa).
+fn stresses(instant: &Instant) -> Option<String> {
+    instant.stresses.first()?;
+    let mut text = String::from("surface,along,x,y,normal_x,normal_y,normal_stress,shear_stress\n");
+    for surface in &instant.stresses {
+        for p in &surface.points {
+            let ([x, y], [nx, ny]) = (p.at, p.normal);
+            let (name, along) = (&surface.name, p.along);
+            let _ = writeln!(text, "{name},{along},{x},{y},{nx},{ny},{},{}", p.pressing, p.shear);
+        }
     }
     Some(text)
 }

@@ -16,6 +16,10 @@ pub struct ForceGauge {
     pub name: String,
     /// What carries the force: a side, a wall or a block.
     pub on: String,
+    /// Its faces along mesh lines, in the plan's units.
+    pub faces: Vec<Segment>,
+    /// Index of the solid of any shape, if it is one.
+    pub solid: Option<usize>,
     /// Nodes, with the components of the force that it carries there.
     pub nodes: Vec<(usize, [bool; 2])>,
     /// The point that the torque refers to, in the plan's units: the middle of its extent.
@@ -126,7 +130,8 @@ pub(super) fn force_gauges(
         };
         let about = supports[k].extent.map(|[low, high]| 0.5 * (low + high));
         let nodes = (0..mesh.nodes()).filter_map(carries).collect();
-        Some(ForceGauge { name: name.clone(), on: on.clone(), nodes, about })
+        let (faces, solid) = (supports[k].faces.clone(), (k < solids).then_some(k));
+        Some(ForceGauge { name: name.clone(), on: on.clone(), faces, solid, nodes, about })
     };
     wanted.iter().filter_map(gauge).collect()
 }

@@ -2,9 +2,8 @@
 
 use super::{BoundaryPlan, Units};
 use crate::scene::FieldFn;
-use crate::space::mesh::{Axis, Mesh};
+use crate::space::mesh::Mesh;
 use crate::space::outline_rule::OutlinePoint;
-use crate::space::segment::Segment;
 use crate::space::shape::{SIDE_NODES, side_normal};
 
 /// How a wall resists material that slides along it.
@@ -119,35 +118,13 @@ impl BoundaryPlan {
         }
         for line in &self.walls {
             let Some(law) = line.slip else { continue };
-            for (cell, side) in faces_of(&line.segment, mesh) {
+            for (cell, side) in line.segment.free_faces(mesh) {
                 out.push(SlipFace { cell, side, law: law.scaled(units), wall: [0.0; 3] });
             }
         }
         out.sort_by_key(|f| (f.cell, f.side));
         out
     }
-}
-
-/// The faces of cells that are not solid on both sides of a segment along mesh lines.
-fn faces_of<'a>(
-    segment: &Segment,
-    mesh: &'a Mesh,
-) -> impl Iterator<Item = (usize, usize)> + use<'a> {
-    let (across, along) = mesh.axes(segment.normal);
-    let normal = segment.normal;
-    let line = across.nearest_line(segment.at);
-    let count = across.cells();
-    let wrapped = |axis: &Axis, k: usize| if axis.periodic() { Some(k % count) } else { None };
-    let above = if line < count { Some(line) } else { wrapped(across, line) };
-    let below = if line > 0 { Some(line - 1) } else { wrapped(across, count - 1) };
-    let [from, to] = [segment.from, segment.to].map(|v| along.nearest_line(v));
-    let both = [(above, 2 * normal), (below, 2 * normal + 1)];
-    both.into_iter()
-        .filter_map(|(cell, side)| Some((cell?, side)))
-        .flat_map(move |(cell, side)| {
-            (from..to).map(move |k| (mesh.cell_across(normal, cell, k), side))
-        })
-        .filter(|&(cell, _)| !mesh.solid[cell])
 }
 
 /// Component of the velocity along a side.

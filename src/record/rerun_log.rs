@@ -7,6 +7,7 @@
 //! | `world/particles`, `world/dye`, `world/directors` | the flow |
 //! | `world/walls`, `world/gauges` | fixed lines |
 //! | `world/moving` | outlines of blocks that move |
+//! | `world/stress/<gauge>` | force per area along a surface, as arrows; `values` holds its numbers |
 //! | `world/fields/<field>/{image,bar,ticks,isolines}` | one field |
 //! | `world/fields/<field>/values` | its values, on half as many samples per side |
 //! | the path of each scalar, and `<path>/log10` | the plots |
@@ -30,6 +31,7 @@ mod salvage;
 mod side_by_side;
 mod sinks;
 mod stage;
+mod surfaces;
 mod viewer;
 
 use std::collections::{HashMap, HashSet};

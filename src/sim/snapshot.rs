@@ -2,6 +2,7 @@
 //! glyphs, fields, arrows and isolines, in SI units.
 
 mod raster;
+mod stresses;
 
 use super::initial::Unfilled;
 use super::simulation::Simulation;
@@ -132,6 +133,7 @@ impl<const D: usize> Simulation<D> {
             arrows: fields.iter().any(|f| f.name == "speed").then(|| self.arrows()),
             fields,
             isolines,
+            stresses: self.stresses(),
             moving: moving(plan),
         }
     }

@@ -25,3 +25,4 @@ pub mod stokes;
 pub mod symbolic;
 pub mod terms;
 mod wall_laws;
+mod wall_stress;

@@ -94,6 +94,11 @@ impl<const D: usize> Stokes<D> {
         self.factor.effort()
     }
 
+    /// Whether the flow determines the pressure of a cell: where all its velocities are given, it does not.
+    pub fn determines_pressure(&self, cell: usize) -> bool {
+        self.matrices.cells[cell].penalty[0] > 0.0
+    }
+
     /// Makes the next factorisation compute the whole factor, for measurements of its time.
     pub fn forget_factor(&mut self) {
         self.factor.forget();

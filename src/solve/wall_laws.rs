@@ -206,7 +206,12 @@ fn on_side(side: usize, t: f64, away: f64) -> [f64; 2] {
 
 /// Velocity and pressure of a flow at a point of an outline. The pressure of a sliver hardly acts on the
 /// flow and is known the less, the smaller it is: there it is that of the cells beside it, continued.
-fn pressed(mesh: &Mesh, cell: usize, r: [f64; 2], flow: &dyn LastFlow) -> Option<([f64; 2], f64)> {
+pub(super) fn pressed(
+    mesh: &Mesh,
+    cell: usize,
+    r: [f64; 2],
+    flow: &dyn LastFlow,
+) -> Option<([f64; 2], f64)> {
     let (u, _) = flow.beside(cell, r)?;
     let p = mesh.from_reference(cell, r);
     let at = |c: usize| {

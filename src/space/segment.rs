@@ -94,4 +94,24 @@ impl Segment {
         let [from, to] = [self.from, self.to].map(|v| along.nearest_line(v));
         (from..to).map(move |k| (k, mesh.cell_across(normal, line, k)))
     }
+
+    /// Cells that are not solid on both sides of the segment, which lies on mesh lines, with the side of
+    /// the cell (left, right, bottom, top) that is on it.
+    pub fn free_faces<'a>(&self, mesh: &'a Mesh) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        let (across, along) = mesh.axes(self.normal);
+        let normal = self.normal;
+        let line = across.nearest_line(self.at);
+        let count = across.cells();
+        let wrapped = |axis: &Axis, k: usize| if axis.periodic() { Some(k % count) } else { None };
+        let above = if line < count { Some(line) } else { wrapped(across, line) };
+        let below = if line > 0 { Some(line - 1) } else { wrapped(across, count - 1) };
+        let [from, to] = [self.from, self.to].map(|v| along.nearest_line(v));
+        let both = [(above, 2 * normal), (below, 2 * normal + 1)];
+        both.into_iter()
+            .filter_map(|(cell, side)| Some((cell?, side)))
+            .flat_map(move |(cell, side)| {
+                (from..to).map(move |k| (mesh.cell_across(normal, cell, k), side))
+            })
+            .filter(|&(cell, _)| !mesh.solid[cell])
+    }
 }

@@ -184,3 +184,37 @@ fn the_gauge_of_a_wall_with_friction_records_its_strength() {
         assert!((normal / (0.2 / c) - 1.0).abs() < 0.03, "{degrees}: {normal}");
     }
 }
+
+#[test]
+fn stresses_along_slanted_walls_are_those_of_the_flow() {
+    let gauges =
+        "[[gauges]]\nname = \"low\"\non = \"lower\"\n[[gauges]]\nname = \"up\"\non = \"upper\"\n";
+    let channel = SlantedChannel { degrees: 30.0, width: 0.25, lower: LowerWall::NoSlip };
+    let text = format!("{}{gauges}", slanted_channel(channel).scene.text());
+    let run = scene(&text, &["accuracy.cells=32"]);
+    for (surface, exact) in run.snapshot().stresses.iter().zip([-0.125, 0.125]) {
+        assert!(surface.points.len() > 30, "{}", surface.points.len());
+        assert!(surface.points.windows(2).all(|p| p[0].along < p[1].along));
+        let inner = surface.points.iter().filter(|p| (p.at[0] - 0.5).abs() < 0.4);
+        for p in inner {
+            assert!((p.shear / exact - 1.0).abs() < 0.02, "{}: {p:?}", surface.name);
+            assert!(p.pressing.abs() < 0.02, "{}: {p:?}", surface.name);
+        }
+    }
+}
+
+#[test]
+fn the_normal_stress_of_a_fluid_at_rest_is_its_weight() {
+    let mut run = hopper(
+        "[boundaries.bottom]\nkind = \"no_slip\"\n[[gauges]]\nname = \"slope\"\non = \"hl\"\n\
+         [[gauges]]\nname = \"side\"\non = \"left\"\n[[gauges]]\nname = \"floor\"\non = \"bottom\"\n",
+    );
+    run.step().unwrap();
+    let surfaces = run.snapshot().stresses;
+    assert_eq!(surfaces.len(), 3);
+    for p in surfaces.iter().flat_map(|s| &s.points).filter(|p| p.at[1] < 1.3) {
+        let exact = 1e4 * (1.5 - p.at[1]) + 10.0 * 0.5;
+        assert!((p.pressing - exact).abs() < 1e-3 * 1.5e4, "{p:?} {exact}");
+        assert!(p.shear.abs() < 1.0, "{p:?}");
+    }
+}

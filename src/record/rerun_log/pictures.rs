@@ -55,6 +55,9 @@ impl RerunLog {
                 .with_radii([Radius::new_ui_points(1.2)])
                 .with_draw_order(depth::GLYPHS),
         )?;
+        for surface in &snapshot.stresses {
+            self.stresses(surface)?;
+        }
         if !snapshot.moving.is_empty() {
             self.rec.log(
                 self.paths.at("world/moving"),

@@ -243,7 +243,7 @@ impl<T: Copy> Changes<T> {
 }
 
 /// Times of the rows that hold a component, on one timeline (s).
-fn seconds(
+pub(super) fn seconds(
     chunk: &Chunk,
     timeline: &'static str,
     component: rerun::ComponentIdentifier,
