@@ -163,9 +163,8 @@ impl<'a> FrozenFlow<'a> {
         });
         threads::for_each(streams, CELL_GRAIN, |cell, stream| {
             let of = mesh.part(cell).and_then(|part| part.stream.as_ref());
-            // Fluxes around an axis have a streamfunction.
-            let flux = |n: usize| velocity[n].map(|u| u * mesh.thickness(mesh.node_position(n)));
-            *stream = of.map(|s| s.flow(&mesh.cell_nodes(cell).map(flux)));
+            let thickness = |n: usize| mesh.thickness(mesh.node_position(n));
+            *stream = of.map(|s| s.flow(&of_nodes(cell), &mesh.cell_nodes(cell).map(thickness)));
         });
         cells.update(mesh, |cell| {
             let mut nodal = of_nodes(cell);
@@ -218,8 +217,8 @@ impl<'a> FrozenFlow<'a> {
         let p = self.mesh.from_reference(cell, r);
         let (solid, d) = self.mesh.parts()?.nearest(p)?;
         let stream = self.mesh.part(cell)?.stream.as_ref()?;
-        let flux = stream.velocity(flow, p, d, solid.outline.normal(p));
-        Some(flux.map(|f| f / self.mesh.thickness(p)))
+        let wall = (d, solid.outline.normal(p));
+        Some(stream.velocity(flow, p, wall, self.mesh.thickness(p)))
     }
 
     /// The start cell with an index.

@@ -55,7 +55,7 @@ impl Mesh {
             let add = |p: Point, normal: Point, length: f64, along: f64| {
                 let beside = [0, 1].map(|c| p[c] + BESIDE * hx.min(hy) * normal[c]);
                 if !parts.is_solid(beside) {
-                    let (r, area) = (self.to_reference(cell, p), self.measure().of_face(length));
+                    let (r, area) = (self.to_reference(cell, p), length * self.thickness(p));
                     let r = r.map(|c| c.clamp(-1.0, 1.0));
                     out.push(OutlinePoint { solid, r, area, normal, along });
                 }

@@ -48,14 +48,16 @@ impl Mesh {
             let centre = self.cell_centre(cell);
             let flipped = [0, 1].map(|c| centre[c] > middle[c]);
             let distance = |r: Point| parts.distance(self.from_reference(cell, r));
-            let rule = rule(flipped, distance);
+            let measure = self.whole_measure(cell);
+            let mut rule = rule(flipped, distance);
+            rule.iter_mut().for_each(|(r, weight)| *weight = measure.share(*weight, r[0]));
             let fraction: f64 = rule.iter().map(|(_, w)| w).sum();
             let unresolved = is_lost(&self, cell, &parts);
             if fraction <= SOLID {
                 self.solid[cell] = true;
             } else if fraction < 1.0 - WHOLE || unresolved {
                 let sides = std::array::from_fn(|side| side_rule(side, distance));
-                let part = part(self.whole_measure(cell), (fraction, rule), &sides, unresolved);
+                let part = part(measure, (fraction, rule), &sides, unresolved);
                 parts.cells[cell] = Some(Box::new(part));
             }
         }
@@ -221,7 +223,13 @@ fn part(
     let mut whole = [[[0.0; NODES]; 2]; 3];
     for (r, weight) in &rule {
         let (volume, shape) = (cell.of_share(*weight), Shape::at(*r));
-        for (row, q) in whole.iter_mut().zip([1.0, r[0], r[1]]) {
+        let per_radius = cell.per_radius(r[0]);
+        for (row, q) in whole.iter_mut().zip(cell.pressure_basis(*r)) {
+            if per_radius != 0.0 {
+                for a in 0..NODES {
+                    row[0][a] += volume * q * per_radius * shape.n[a];
+                }
+            }
             for a in 0..NODES {
                 row[0][a] += volume * q * shape.d_xi[a] * 2.0 / cell.size[0];
                 row[1][a] += volume * q * shape.d_eta[a] * 2.0 / cell.size[1];
@@ -237,8 +245,9 @@ fn part(
         let c = side_normal(side);
         let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
         for (r, weight) in rule {
-            let (area, n) = (sign * weight * cell.of_side(side).area, Shape::values(*r));
-            for (row, q) in divergence.iter_mut().zip([1.0, r[0], r[1]]) {
+            let area = sign * cell.of_side(side).of_point(*weight, r[1 - c]);
+            let n = Shape::values(*r);
+            for (row, q) in divergence.iter_mut().zip(cell.pressure_basis(*r)) {
                 row[c].iter_mut().zip(n).for_each(|(entry, n)| *entry += area * q * n);
             }
         }

@@ -1,9 +1,10 @@
 //! This module gives the velocity beside solids of any shape a streamfunction, with which points move.
 //!
 //! ```text
-//! psi = d^m phi(x, y),   u = (d psi/dy, -d psi/dx)
+//! psi = d^m phi(x, y),   s u = (d psi/dy, -d psi/dx)
 //! ```
-//! relative to the velocity of the solid, with the distance `d` from the solid, `m = 2` where the velocity vanishes on it and 1 where it
+//! relative to the velocity of the solid, with the thickness `s` of the domain (1 in the plane, `2 pi x`
+//! around an axis), the distance `d` from the solid, `m = 2` where the velocity vanishes on it and 1 where it
 //! slips, and a quadratic `phi`. Such a velocity has no divergence and never leads into the solid. The
 //! velocity of the solver has no divergence in the mean of a cell only: where it leads towards a wall
 //! or away from it with a velocity proportional to the distance, points accumulate or are missing.
@@ -39,19 +40,29 @@ pub struct Stream {
 pub struct StreamFlow(SVector<f64, TERMS>);
 
 impl Stream {
-    /// The coefficients for the nodal velocities of the cell.
-    pub fn flow(&self, nodal: &[[f64; 2]; NODES]) -> StreamFlow {
+    /// The coefficients for the nodal velocities of the cell, with the thicknesses of the domain at its
+    /// nodes.
+    pub fn flow(&self, nodal: &[[f64; 2]; NODES], thickness: &[f64; NODES]) -> StreamFlow {
         let of = |form: &Form| -> f64 {
-            let relative = |j: usize| nodal[j % NODES][j / NODES] - self.velocity[j / NODES];
+            let relative = |j: usize| {
+                thickness[j % NODES] * (nodal[j % NODES][j / NODES] - self.velocity[j / NODES])
+            };
             form.iter().enumerate().map(|(j, f)| f * relative(j)).sum()
         };
         StreamFlow(SVector::from_fn(|k, _| of(&self.map[k])))
     }
 
-    /// Velocity at a point with the distance `d` from the solid, along the unit normal `n`.
-    pub fn velocity(&self, flow: &StreamFlow, p: Point, d: f64, n: Point) -> Point {
-        let [x, y] = self.rows(p, d.max(0.0), n).map(|row| row.dot(&flow.0));
-        [x + self.velocity[0], y + self.velocity[1]]
+    /// Velocity at a point with the distance `d` from the solid, along the unit normal `n`, where the
+    /// domain has the given thickness.
+    pub fn velocity(
+        &self,
+        flow: &StreamFlow,
+        p: Point,
+        (d, n): (f64, Point),
+        thickness: f64,
+    ) -> Point {
+        let flux = self.rows(p, d.max(0.0), n).map(|row| row.dot(&flow.0));
+        [0, 1].map(|c| flux[c] / thickness + self.velocity[c])
     }
 
     /// The terms of `phi` at a point.

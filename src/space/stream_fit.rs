@@ -136,10 +136,11 @@ mod tests {
         for (cell, part) in parts.all() {
             let Some(stream) = &part.stream else { continue };
             count += 1;
-            let flow = stream.flow(&mesh.cell_nodes(cell).map(|n| exact(mesh.node_position(n))));
+            let flow = stream
+                .flow(&mesh.cell_nodes(cell).map(|n| exact(mesh.node_position(n))), &[1.0; NODES]);
             for q in &part.points {
                 let p = mesh.from_reference(cell, q.r);
-                let u = stream.velocity(&flow, p, outline.distance(p), outline.normal(p));
+                let u = stream.velocity(&flow, p, (outline.distance(p), outline.normal(p)), 1.0);
                 let e = exact(p);
                 let error = (u[0] - e[0]).hypot(u[1] - e[1]);
                 assert!(error < 2e-3, "{cell}: {u:?} {e:?}");

@@ -2,7 +2,7 @@
 
 use super::values::Result;
 use crate::plan::boundary::Side;
-use crate::scene::{BoundaryKind, FieldFn, Geometry, Scene, SceneError};
+use crate::scene::{BoundaryKind, FieldFn, Geometry, Scene, SceneError, Scope};
 
 /// Whether the left side of the domain is the axis.
 pub(super) fn is_axis(scene: &Scene, x: [f64; 2]) -> bool {
@@ -49,6 +49,22 @@ pub(super) fn check(scene: &Scene, x: [f64; 2], gravity: [f64; 2]) -> Result<()>
             "boundaries.left is given, but the left side is the axis",
             "remove the table: at the axis the flow is smooth",
         ));
+    }
+    Ok(())
+}
+
+/// Refuses blocks that move along the radius: a round block would have to change its size.
+pub(super) fn check_moving(scene: &Scene, scope: &Scope) -> Result<()> {
+    for block in &scene.blocks {
+        let Some([x, _]) = &block.velocity else { continue };
+        let rests = matches!(x.in_time(scope)?, FieldFn::Constant(v) if v == 0.0);
+        if scene.domain.geometry == Geometry::Axisymmetric && !rests {
+            return Err(SceneError::at(
+                x,
+                format!("block `{}` moves along the radius", block.name),
+                "a round block moves along the axis only: velocity = [0, <speed>]",
+            ));
+        }
     }
     Ok(())
 }

@@ -78,6 +78,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
     }
     let si = SiMatter::new(scene, scope)?;
     axis::check(scene, x, si.gravity)?;
+    axis::check_moving(scene, scope)?;
     let units = scales::choose_units(scene, scope, &si, domain, length)?;
     let mut state = si.matter(&units);
     warnings.extend(si.warnings.iter().cloned());
