@@ -79,6 +79,8 @@ pub struct Frames {
     pub materials: Vec<String>,
     /// The series of the run; `None` if there is none.
     pub series: Option<Table>,
+    /// Whether the flow is round: x is the distance from the axis.
+    pub round: bool,
 }
 
 /// Reads the pictures of a run from its folder or a recording.
@@ -90,6 +92,7 @@ pub fn read(run: &Path) -> Result<Frames, ExportError> {
     let mut frames = Frames {
         materials: info.materials.iter().map(|m| m.name.clone()).collect(),
         series: member.table.clone(),
+        round: info.round,
         ..Frames::default()
     };
     for (time, particles) in recorded.particles() {

@@ -12,11 +12,15 @@ use std::path::Path;
 const VERTEX: u8 = 1;
 /// VTK cell type of a quadrilateral.
 const QUAD: u8 = 9;
+/// VTK cell type of a hexahedron.
+const HEXAHEDRON: u8 = 12;
+/// Azimuths of the two faces of the wedge that stands for the fields of a round flow, rad.
+const WEDGE: [f32; 2] = [-0.05, 0.05];
 
 /// An unstructured grid with data at its points or cells.
 #[derive(Default)]
 struct Grid {
-    points: Vec<[f32; 2]>,
+    points: Vec<[f32; 3]>,
     /// Point indices of all cells; each cell has `points_per_cell`.
     cells: Vec<i64>,
     points_per_cell: usize,
@@ -26,10 +30,11 @@ struct Grid {
 }
 
 /// Writes `particles_<n>.vtu` and `fields_<n>.vtu`, a `.pvd` index with the times for each, and
-/// `materials.csv`. Returns the number of files.
+/// `materials.csv`. The fields of a round flow fill a thin wedge. Returns the number of files.
 pub(super) fn write(frames: &Frames, folder: &Path) -> Result<usize, ExportError> {
     let particles = |i: &Instant| i.particles.as_ref().map(particles);
-    let fields = |i: &Instant| (!i.fields.is_empty()).then(|| fields(&i.fields));
+    let grid = if frames.round { wedge } else { fields };
+    let fields = |i: &Instant| (!i.fields.is_empty()).then(|| grid(&i.fields));
     let numbered = frames.materials.iter().enumerate();
     let names: String = numbered.map(|(n, name)| format!("{n},{name}\n")).collect();
     write_file(folder.join("materials.csv"), format!("number,name\n{names}"))?;
@@ -67,7 +72,7 @@ fn series(
 fn particles(particles: &ParticleSnapshot) -> Grid {
     let class = particles.class.iter().flat_map(|c| i32::from(*c).to_le_bytes()).collect();
     Grid {
-        points: particles.positions.clone(),
+        points: particles.positions.iter().map(|&[x, y]| [x, y, 0.0]).collect(),
         cells: (0..particles.positions.len() as i64).collect(),
         points_per_cell: 1,
         kind: VERTEX,
@@ -84,15 +89,37 @@ fn fields(fields: &[GridField]) -> Grid {
     let corners = (0..=ny).flat_map(|j| (0..=nx).map(move |i| corner(i, j)));
     let quads = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j)));
     let around = |(i, j)| [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
-    let data = |f: &GridField| {
-        array(&f.name, "Float32", 1, f.values.iter().flat_map(|v| v.to_le_bytes()).collect())
-    };
     Grid {
-        points: corners.collect(),
+        points: corners.map(|[x, y]| [x, y, 0.0]).collect(),
         cells: quads.flat_map(around).collect(),
         points_per_cell: 4,
         kind: QUAD,
         cell_data: fields.iter().map(data).collect(),
+        ..Grid::default()
+    }
+}
+
+/// Values of a field in cells.
+fn data(field: &GridField) -> String {
+    let bytes = field.values.iter().flat_map(|v| v.to_le_bytes());
+    array(&field.name, "Float32", 1, bytes.collect())
+}
+
+/// The fields of a round flow in a wedge around the half-plane that is computed.
+fn wedge(fields: &[GridField]) -> Grid {
+    let flat = self::fields(fields);
+    let count = flat.points.len() as i64;
+    let turned = |azimuth: f32| {
+        let (s, c) = azimuth.sin_cos();
+        flat.points.iter().map(move |[x, y, _]| [x * c, *y, x * s])
+    };
+    let both = |quad: &[i64]| [quad.to_vec(), quad.iter().map(|k| k + count).collect()].concat();
+    Grid {
+        points: WEDGE.into_iter().flat_map(turned).collect(),
+        cells: flat.cells.chunks(4).flat_map(both).collect(),
+        points_per_cell: 8,
+        kind: HEXAHEDRON,
+        cell_data: flat.cell_data.clone(),
         ..Grid::default()
     }
 }
@@ -112,7 +139,7 @@ fn array(name: &str, kind: &str, components: usize, bytes: Vec<u8>) -> String {
 impl Grid {
     fn xml(&self) -> String {
         let count = self.cells.len() / self.points_per_cell.max(1);
-        let points = self.points.iter().flat_map(|p| [p[0], p[1], 0.0]);
+        let points = self.points.iter().flatten().copied();
         let points = array("Points", "Float32", 3, points.flat_map(f32::to_le_bytes).collect());
         let cells = self.cells.iter().flat_map(|p| p.to_le_bytes()).collect();
         let ends = (1..=count).flat_map(|n| ((n * self.points_per_cell) as i64).to_le_bytes());
