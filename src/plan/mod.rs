@@ -346,11 +346,6 @@ impl Plan {
         self.state.materials.iter().filter_map(of).reduce(f64::max)
     }
 
-    /// Whether particles may enter, or leave through sides.
-    pub fn exchanges_volume(&self) -> bool {
-        self.enclosure.is_open() || !self.boundary.sources.is_empty()
-    }
-
     /// Whether gravity or an acceleration acts on the materials.
     pub fn has_weight(&self) -> bool {
         self.effects.gravity || self.acceleration.is_some()
@@ -377,11 +372,6 @@ impl Plan {
             Quadrature::Sides if !self.has_mass() => Quadrature::Laminate,
             rule => rule,
         }
-    }
-
-    /// Index of the background material, which fills the part of the domain outside all regions.
-    pub fn background(&self) -> Option<u8> {
-        self.state.materials.iter().position(|m| m.background).map(|m| m as u8)
     }
 
     /// Whether a frame is due at the given time, s. `count` is the number of frames up to the last

@@ -42,6 +42,16 @@ impl Source {
 }
 
 impl Plan {
+    /// Whether particles may enter, or leave through sides.
+    pub fn exchanges_volume(&self) -> bool {
+        self.enclosure.is_open() || !self.boundary.sources.is_empty()
+    }
+
+    /// Index of the background material, which fills the part of the domain outside all regions.
+    pub fn background(&self) -> Option<u8> {
+        self.state.materials.iter().position(|m| m.background).map(|m| m as u8)
+    }
+
     /// Which sources are on after a time, in the plan's units.
     pub fn sources_on(&self, time: f64) -> Vec<bool> {
         self.boundary.sources.iter().map(|s| s.is_on(time, TINY * self.clock.end)).collect()

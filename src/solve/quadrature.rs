@@ -55,7 +55,7 @@ pub struct Quadrature {
     /// Index of the first point of each cell, and the number of points.
     pub(super) start: Vec<u32>,
     /// Sides of each cell on which the velocity is prescribed.
-    walls: Vec<FixedSides>,
+    pub(super) walls: Vec<FixedSides>,
     /// Parts of cells with solids of any shape in them.
     parts: SharedParts,
     /// Stiffness of cut cells.
@@ -146,11 +146,6 @@ impl Quadrature {
             }
         }
         out
-    }
-
-    /// Declares the sides of each cell on which the velocity is prescribed.
-    pub fn bind_walls(&mut self, fixed: impl Fn(usize) -> FixedSides) {
-        self.walls.iter_mut().enumerate().for_each(|(cell, walls)| *walls = fixed(cell));
     }
 
     /// Materials of all cells.

@@ -8,6 +8,7 @@ use super::terms::slip_outline::SlipOutlines;
 use crate::composition::EmptyCell;
 use crate::plan::material::Material;
 use crate::plan::{BoundaryPlan, SlipFace, SlipPoint, Units};
+use crate::space::constraints::FixedSides;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_3, side_normal};
@@ -17,6 +18,11 @@ use crate::space::shape::{GAUSS_3, side_normal};
 const STICKING: f64 = 1e4;
 
 impl Quadrature {
+    /// Declares the sides of each cell on which the velocity is prescribed.
+    pub fn bind_walls(&mut self, fixed: impl Fn(usize) -> FixedSides) {
+        self.walls.iter_mut().enumerate().for_each(|(cell, walls)| *walls = fixed(cell));
+    }
+
     /// Declares the faces and the points of outlines along which material slips.
     pub fn bind_slip(&mut self, mesh: &Mesh, boundary: &BoundaryPlan, units: &Units) {
         self.slip = SlipFaces::new(mesh, boundary.slip_faces(mesh, units));
