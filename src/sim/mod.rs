@@ -25,6 +25,7 @@ mod measure;
 mod moving;
 mod notes;
 pub mod phases;
+mod reach;
 pub mod row;
 mod run;
 mod sampling;

@@ -5,8 +5,8 @@ use super::error::SimError;
 use super::inertia::Inertia;
 use super::initial;
 use super::interest::Interest;
-use super::moving;
 use super::phases::Phases;
+use super::reach::Reach;
 use super::row::Row;
 use crate::motion::advect::Displacements;
 use crate::motion::frozen_flow::CellVelocities;
@@ -35,7 +35,7 @@ pub struct Simulation<const D: usize> {
     /// Places of the blocks that move at the current time.
     pub(super) standing: Vec<Pose>,
     /// Nodes at and in the solids that move; empty without any.
-    pub(super) reach: moving::Reach,
+    pub(super) reach: Reach,
     pub(super) stokes: Stokes<D>,
     pub(super) quadrature: Quadrature,
     /// Volume factors of the materials with which the current integration points were made.
@@ -197,7 +197,7 @@ impl<const D: usize> Simulation<D> {
             attempted: 0.0,
             factors_of_points: vec![],
             standing: plan.poses.clone(),
-            reach: moving::Reach::of(&plan),
+            reach: Reach::of(&plan),
             particles,
             stokes,
             plan,
