@@ -79,7 +79,10 @@ impl<const D: usize> Stokes<D> {
             self.mesh.parts().filter(|p| p.move_on()).into_iter().flat_map(Parts::all)
         {
             let [u, v] = part.velocity;
-            out.supplied += flow.pressure[cell][0] * part.swept;
+            // Pressures that are not solved for are counted with the continued ones.
+            if self.determines_pressure(cell) {
+                out.supplied += flow.pressure[cell][0] * part.swept;
+            }
             out.drive += quadrature.mean_viscosity[cell] * (u * u + v * v);
         }
         if let Some(relations) = self.constraints.embedding() {
