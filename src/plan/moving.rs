@@ -4,6 +4,7 @@
 use super::Plan;
 use super::resolve;
 use crate::scene::{FieldFn, SceneError};
+use crate::space::shape::{GAUSS_3, GAUSS_3_WEIGHTS};
 
 /// Number of pieces of a step in which a velocity that varies is integrated.
 const PIECES: usize = 16;
@@ -32,16 +33,17 @@ impl Moving {
         self.velocity.each_ref().map(|v| v.at(time, 0.0))
     }
 
-    /// Displacement from one time to another, s: exact for a constant velocity, otherwise by Simpson's
-    /// rule.
+    /// Displacement from one time to another, s: exact for a constant velocity, otherwise by
+    /// Gauss's rule of three points in each of some pieces.
     pub fn displacement(&self, from: f64, to: f64) -> [f64; 2] {
         let piece = (to - from) / PIECES as f64;
         self.velocity.each_ref().map(|v| {
             if let Some(v) = v.constant() {
                 return v * (to - from);
             }
-            let at = |k: usize, t: f64| v.at(from + piece * (k as f64 + t), 0.0);
-            let mean = |k: usize| (at(k, 0.0) + 4.0 * at(k, 0.5) + at(k, 1.0)) / 6.0;
+            let at = |k: usize, g: f64| v.at(from + piece * (k as f64 + 0.5 + 0.5 * g), 0.0);
+            let points = GAUSS_3.iter().zip(GAUSS_3_WEIGHTS);
+            let mean = |k: usize| points.clone().map(|(g, w)| w * at(k, *g)).sum::<f64>();
             (0..PIECES).map(|k| piece * mean(k)).sum()
         })
     }
