@@ -15,8 +15,8 @@
 //! ```text
 //! c (D_tt - tr(D)/3)^2 + (M + tr N) (w/x)^2,   c = 3 eta
 //! ```
-//! With these the power of an isotropic fluid is `2 eta D':D' + beta tr(D)^2` with the deviator in three
-//! dimensions. The hoop direction lies in the layers of a layered material: `eta` is the viscosity of
+//! and `(2/3) beta tr(D)^2` takes the place of `beta tr(D)^2`. With `beta = eta` an isotropic fluid has
+//! `2 eta D:D` again, with `beta = 0` it has `2 eta D':D'` with the deviator in three dimensions. The hoop direction lies in the layers of a layered material: `eta` is the viscosity of
 //! stretching.
 
 use super::rates::{Rates, Stress};
@@ -132,7 +132,7 @@ impl PointLaw {
                 volume * (self.shear.a * r.d[0] + self.shear.c * r.d[1]),
                 volume * (self.shear.c * r.d[0] + self.shear.b * r.d[1]),
             ],
-            mean: volume * self.dilation * r.trace,
+            mean: volume * self.dilation * (r.trace - r.third),
             skew: volume * 4.0 * self.coupling * r.relative_spin,
             couple: [0, 1].map(|c| volume * self.couple * r.kappa[c] + volume * bending[c]),
             hoop: volume * self.hoop * r.hoop,
@@ -162,7 +162,7 @@ impl PointLaw {
     #[inline(always)]
     pub fn power_in_plane(&self, r: &Rates) -> f64 {
         self.shear.quadratic(r.d)
-            + self.dilation * r.trace * r.trace
+            + self.dilation * r.trace * (r.trace - r.third)
             + 4.0 * self.coupling * r.relative_spin * r.relative_spin
             + self.couple * (r.kappa[0] * r.kappa[0] + r.kappa[1] * r.kappa[1])
             + self.bending.quadratic(r.kappa)

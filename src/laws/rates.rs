@@ -32,6 +32,8 @@ pub struct Rates {
     pub hoop: f64,
     /// Hoop curvature `w/x`, 1/(m s); zero in the plane.
     pub hoop_kappa: f64,
+    /// `tr(D)/3`, 1/s; zero in the plane.
+    pub third: f64,
 }
 
 impl Stress {
@@ -77,12 +79,13 @@ impl Rates {
     #[inline(always)]
     pub fn around_axis(self, hoop: f64, hoop_kappa: f64) -> Self {
         let trace = self.trace + hoop;
-        Rates { trace, hoop: hoop - trace / 3.0, hoop_kappa, ..self }
+        let third = trace / 3.0;
+        Rates { trace, hoop: hoop - third, hoop_kappa, third, ..self }
     }
 
     /// Hoop rate `u/x`, 1/s, of a flow around the axis.
     pub fn hoop_rate(&self) -> f64 {
-        self.hoop + self.trace / 3.0
+        self.hoop + self.third
     }
 
     /// Adds `f` times other rates.
@@ -95,12 +98,14 @@ impl Rates {
         self.relative_spin += f * o.relative_spin;
         self.hoop += f * o.hoop;
         self.hoop_kappa += f * o.hoop_kappa;
+        self.third += f * o.third;
     }
 
-    /// Square of the strain rate, 1/s2: `D:D` in the plane; around an axis `D:D + tr(D)^2/6`.
+    /// Square of the strain rate, `D:D`, 1/s2.
     #[inline(always)]
     pub fn strain_squared(&self) -> f64 {
-        0.5 * (self.d[0] * self.d[0] + self.d[1] * self.d[1] + self.trace * self.trace)
+        let dilation = self.trace * (self.trace - self.third);
+        0.5 * (self.d[0] * self.d[0] + self.d[1] * self.d[1] + dilation)
             + 1.5 * self.hoop * self.hoop
     }
 }

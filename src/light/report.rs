@@ -6,7 +6,6 @@ use super::{BASE_STYLE, CANVAS, DRAWING, Description, STYLE, VIEW};
 use crate::record::replace::{self, Kind, ReplaceError};
 use crate::record::text::escape;
 use crate::results::Member;
-use crate::scene::Geometry;
 use crate::sim::row;
 use crate::words::count;
 use base64::Engine;
@@ -85,7 +84,7 @@ fn page(members: &[Member], detail: Detail, command: &str) -> Result<String, Rep
         runs.push(run);
         notes.extend(note);
     }
-    let geometry = members.first().map_or(Geometry::Plane, Member::geometry);
+    let geometry = members.first().map(Member::geometry).unwrap_or_default();
     let columns = runs.iter().filter_map(|r| r.series.as_ref()).flat_map(|s| &s.columns);
     let units = columns.filter_map(|c| Some((c.clone(), row::find(c)?.unit_in(geometry))));
     let units = units.filter(|(_, unit)| !unit.is_empty()).collect();

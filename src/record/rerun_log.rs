@@ -24,6 +24,7 @@ mod world;
 mod blueprint;
 mod colour_bar;
 mod decode;
+mod paths;
 mod race;
 mod read;
 mod repair;
@@ -56,6 +57,7 @@ use crate::frame::{Frame, Quantity, Rect, RunInfo};
 use crate::record::colour::ColourScale;
 use crate::record::replace::ReplaceError;
 use crate::web::stream::Stream;
+use paths::Paths;
 use sinks::{Destinations, Live, Page, RrdFile};
 
 /// Application identifier of all recordings.
@@ -152,38 +154,6 @@ pub enum RecordError {
         /// Required number of values.
         expected: usize,
     },
-}
-
-/// Entity paths of one run.
-struct Paths {
-    root: EntityPath,
-}
-
-impl Paths {
-    fn new(name: &str) -> Self {
-        Self::below(RUNS, name)
-    }
-
-    fn below(folder: &str, name: &str) -> Self {
-        let parts = [folder, name].map(|part| EntityPathPart::new(part.to_owned()));
-        Self { root: EntityPath::new(parts.to_vec()) }
-    }
-
-    /// The entity at a path below the run; parts are separated by slashes.
-    fn at(&self, path: &str) -> EntityPath {
-        let parts = path.split('/').filter(|part| !part.is_empty());
-        let parts = parts.map(|part| EntityPathPart::new(part.to_owned()));
-        self.root.join(&EntityPath::new(parts.collect()))
-    }
-
-    fn field(&self, name: &str) -> EntityPath {
-        let part = EntityPathPart::new(name.to_owned());
-        self.at("world/fields").join(&EntityPath::new(vec![part]))
-    }
-
-    fn curve(&self, path: &str, log10: bool) -> EntityPath {
-        if log10 { self.at(&format!("{path}/log10")) } else { self.at(path) }
-    }
 }
 
 /// An open recording.

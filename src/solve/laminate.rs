@@ -296,6 +296,7 @@ pub fn matrix(cut: &Cut) -> VelocityMatrix {
         add_row(&mut row, -1.0, &stretch[0]);
         add_row(&mut row, -frame.along(g.r, cut.cell.size), &stretch[1]);
         add_square(&mut k, w * loose * a_h, &row);
+        let dilation = if cell.is_ring() { dilation / 1.5 } else { dilation };
         add_square(&mut k, w * stiffening * dilation, &Frame::row(s, [0.0; 2], 1.0));
     }
     for i in 0..N {
@@ -360,7 +361,7 @@ mod tests {
     use crate::laws::{director::Orientation, layered};
     use crate::scene::Placement;
     use crate::solve::element::{LOCAL, Matrix, mirror};
-    use crate::solve::terms::viscous::add_stiffness;
+    use crate::solve::terms::stress::add_stiffness;
     use crate::space::measure::Measure;
     use crate::space::mesh::{Axis, Mesh};
     use crate::space::particles::Particles;

@@ -6,7 +6,8 @@ use super::element::{
 use super::quadrature::Quadrature;
 use super::terms::pressure::Divergence;
 use super::terms::rotation::RotationModes;
-use super::terms::viscous::{add_cut_stiffness, add_stiffness};
+use super::terms::stress::add_stiffness;
+use super::terms::viscous::add_cut_stiffness;
 use super::terms::{FaceTerm, Terms};
 use crate::composition::Content;
 use crate::space::constraints::Constraints;

@@ -243,7 +243,7 @@ mod tests {
     use crate::laws::director::Orientation;
     use crate::laws::{Here, Law};
     use crate::solve::element::{LOCAL, Matrix, mirror};
-    use crate::solve::terms::viscous::add_stiffness;
+    use crate::solve::terms::stress::add_stiffness;
     use crate::space::measure::Measure;
     use nalgebra::SMatrix;
 

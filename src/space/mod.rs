@@ -24,4 +24,5 @@ pub mod shape;
 pub mod solids;
 pub mod stream;
 mod stream_fit;
+mod ties;
 pub mod walls;

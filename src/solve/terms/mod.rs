@@ -3,7 +3,7 @@
 //!
 //! | term | file | matrix | load |
 //! |---|---|---|---|
-//! | stresses of the materials | [`viscous`] | yes | |
+//! | stresses of the materials | [`stress`], [`viscous`] | yes | |
 //! | coupling beyond the shear viscosity | [`rotation`] | yes | |
 //! | pressure and incompressibility | [`pressure`] | penalty | |
 //! | weight of the materials | [`weight`] | | yes |
@@ -24,6 +24,7 @@ pub mod restoring;
 pub mod rotation;
 pub mod slip;
 pub mod slip_outline;
+pub mod stress;
 pub mod viscous;
 pub mod weight;
 

@@ -11,71 +11,16 @@
 //! rule are computed for eight cells at a time by sum factorisation.
 
 use super::rotation::RotationModes;
+use super::stress::Stress;
 use crate::composition::Content;
 use crate::laws::point::{PointLaw, Sym2};
-use crate::laws::{self, rates::Rates};
+use crate::laws::rates::Rates;
 use crate::simd::{Simd, dispatch, multiply_add};
 use crate::solve::element::{Gradient, Matrix, Nodal, PointShape, rates};
 use crate::solve::points::{CutStiffness, IntegrationPoint};
 use crate::solve::quadrature::Quadrature;
 use crate::space::measure::CellMeasure;
 use crate::space::shape::{GAUSS_3, GAUSS_3_WEIGHTS, NODES, SLOPES_AT_GAUSS, VALUES_AT_GAUSS};
-
-/// Stresses at a point times its volume, by the derivatives they are conjugate to: their virtual
-/// power is `sum_c x[c] du_c/dx + y[c] du_c/dy + w w~`, and around an axis besides
-/// `hoop[0] u/x + hoop[1] w/x`.
-#[derive(Clone, Copy)]
-pub struct Stress<const D: usize> {
-    x: [f64; D],
-    y: [f64; D],
-    w: f64,
-    hoop: [f64; 2],
-}
-
-impl<const D: usize> Stress<D> {
-    /// Stresses of a law at the rates `r`, multiplied by the volume of the point.
-    #[inline(always)]
-    pub fn new(law: &PointLaw, r: &Rates, volume: f64) -> Self {
-        Self::of(law.stress(r, volume))
-    }
-
-    #[inline(always)]
-    fn of(mut stress: laws::rates::Stress) -> Self {
-        if D == 2 {
-            stress.skew = 0.0;
-        }
-        let (x, y, w) = ([0.0; D], [0.0; D], -stress.skew);
-        let ([[xx, xy], [yx, yy]], hoop) = stress.components();
-        let mut out = Stress { x, y, w, hoop: [hoop, 0.0] };
-        (out.x[0], out.y[0]) = (xx, xy);
-        (out.x[1], out.y[1]) = (yx, yy);
-        if D == 3 {
-            (out.x[D - 1], out.y[D - 1]) = (stress.couple[0], stress.couple[1]);
-            out.hoop[1] = stress.hoop_couple;
-        }
-        out
-    }
-
-    /// Adds the virtual power of the stresses to the nodal forces.
-    pub fn add_force(&self, s: &PointShape, f: &mut Nodal<D>) {
-        for a in 0..NODES {
-            for c in 0..D {
-                f[a][c] += self.x[c] * s.gx[a] + self.y[c] * s.gy[a];
-            }
-            if D == 3 {
-                f[a][D - 1] += self.w * s.n[a];
-            }
-        }
-        if s.per_radius != 0.0 {
-            for a in 0..NODES {
-                f[a][0] += self.hoop[0] * s.per_radius * s.n[a];
-                if D == 3 {
-                    f[a][D - 1] += self.hoop[1] * s.per_radius * s.n[a];
-                }
-            }
-        }
-    }
-}
 
 /// Internal forces of a cell, with its dissipation and strain.
 #[derive(Clone, Copy)]
@@ -408,48 +353,6 @@ fn down<const FMA: bool>(values: &[Lanes; 9], slopes: &[Lanes; 9]) -> [Lanes; 9]
     out
 }
 
-/// Adds the stiffness of a point with the given volume to the element matrix, only in the blocks of
-/// components on and below the diagonal; [`mirror`](crate::solve::element::mirror) fills the
-/// others.
-pub fn add_stiffness<const D: usize>(k: &mut Matrix, s: &PointShape, law: &PointLaw, volume: f64) {
-    for component in 0..D {
-        for a in 0..NODES {
-            let mut g = Gradient { x: [0.0; D], y: [0.0; D], w: 0.0, hoop: None };
-            (g.x[component], g.y[component]) = (s.gx[a], s.gy[a]);
-            if component == 2 {
-                g.w = s.n[a];
-            }
-            let ring = s.per_radius != 0.0;
-            let around = s.per_radius * s.n[a];
-            if ring {
-                let of = |c: usize| if component == c { around } else { 0.0 };
-                g.hoop = Some([of(0), of(2)]);
-            }
-            // The stress of a unit value of this unknown; its forces on all unknowns are the row.
-            let t = Stress::<D>::new(law, &g.rates(), volume);
-            let row = &mut k[NODES * component + a];
-            for c in 0..=component {
-                for b in 0..NODES {
-                    row[NODES * c + b] += t.x[c] * s.gx[b] + t.y[c] * s.gy[b];
-                }
-            }
-            if component == 2 {
-                for b in 0..NODES {
-                    row[2 * NODES + b] += t.w * s.n[b];
-                }
-            }
-            if ring {
-                for b in 0..NODES {
-                    row[b] += t.hoop[0] * s.per_radius * s.n[b];
-                    if component == 2 {
-                        row[2 * NODES + b] += t.hoop[1] * s.per_radius * s.n[b];
-                    }
-                }
-            }
-        }
-    }
-}
-
 /// Adds the stiffness of a cut cell, in the blocks of components on and below the diagonal.
 pub fn add_cut_stiffness(k: &mut Matrix, cut: &CutStiffness) {
     for (i, row) in cut.matrix.iter().enumerate() {
@@ -463,6 +366,7 @@ pub fn add_cut_stiffness(k: &mut Matrix, cut: &CutStiffness) {
 mod tests {
     use super::*;
     use crate::solve::element::{LOCAL, mirror};
+    use crate::solve::terms::stress::add_stiffness;
     use crate::space::measure::Measure;
     use crate::space::shape::{GAUSS_3X3, GaussPoint, Shape};
 
