@@ -93,7 +93,8 @@ fn stresses(n: usize, instant: &Instant) -> Option<Group> {
     let indices = instant.stresses.iter().enumerate();
     let indices = indices.flat_map(|(k, s)| vec![k as u16; s.points.len()]);
     group.push(("surface".into(), Column::Text(indices.collect(), names)));
-    let columns: [(&str, fn(&SurfacePoint) -> f32); 7] = [
+    type Value = fn(&SurfacePoint) -> f32;
+    let columns: [(&str, Value); 7] = [
         ("along", |p| p.along),
         ("x", |p| p.at[0]),
         ("y", |p| p.at[1]),

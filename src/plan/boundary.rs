@@ -315,7 +315,7 @@ pub(super) fn boundary(
     // Inertia determines the velocity of a body that nothing holds.
     // No flow around an axis is a translation along the radius.
     let round = mesh.measure().is_ring();
-    let free_translation = [0, 1].map(|c| !held(c) && !inertia && !(round && c == 0));
+    let free_translation = [0, 1].map(|c| !(held(c) || inertia || round && c == 0));
     let compressible = state.materials.iter().any(|m| m.law.compliance > 0.0);
     let closed = !compressible
         && pieces(&sides).all(|(s, p)| p.conditions.velocity[side_normal(s)].is_some());

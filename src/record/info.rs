@@ -145,7 +145,7 @@ fn plots(plan: &Plan) -> Vec<Plot> {
     let plot = |panel: Panel| {
         let (title, log10) = panel.heading(plan.scene.domain.geometry);
         let series = curves(panel);
-        (!series.is_empty()).then(|| Plot { title, log10, series })
+        (!series.is_empty()).then_some(Plot { title, log10, series })
     };
     Panel::ALL.into_iter().filter_map(plot).collect()
 }

@@ -61,7 +61,7 @@ pub enum SimError {
         /// Time, s.
         time: f64,
         /// What is wrong, with the remedy.
-        source: SceneError,
+        source: Box<SceneError>,
     },
     /// A block that moves closes a part of the domain whose volume it changes.
     #[error(

@@ -98,7 +98,8 @@ impl<const D: usize> Simulation<D> {
         }
         let (step, time) = (self.step, self.si_time());
         let posed = self.plan.posed(poses);
-        let plan = posed.map_err(|source| SimError::Blocks { step, time, source })?;
+        let plan =
+            posed.map_err(|source| SimError::Blocks { step, time, source: Box::new(source) })?;
         let plan = Arc::new(plan);
         if let Some([x, y]) = trapped(&plan, &self.sources_on) {
             return Err(SimError::Trapped { step, time, x, y });

@@ -5,7 +5,8 @@
 //! K = sum over both sides of  integral over the side of  d~.S d + beta tr~ tr
 //! ```
 //! The integrals are exact. For any line the matrix is therefore positive semi-definite, and a cell
-//! that is mostly filled by the stiff fluid keeps its stiffness.
+//! that is mostly filled by the stiff fluid keeps its stiffness. (Around an axis the weights of the points are
+//! positive instead, which has the same effect.)
 //!
 //! **Kink.** Where the viscosities differ, the true velocity along the line has a kink, which a
 //! biquadratic velocity cannot have. The kink
@@ -117,7 +118,7 @@ impl Kinked {
         for (g, &share) in GAUSS_6X6.iter().zip(&cut.share) {
             let s = PointShape::new(&g.shape, cell, g.r[0]);
             let rates = self.rates(g, cell);
-            let shares = [1.0 - share, share];
+            let shares = shares(share, cell);
             for side in 0..2 {
                 let volume = cell.of_point(g.weight * shares[side], g.r[0]);
                 itself += volume * laws[side].power(&rates[side]);
@@ -172,7 +173,7 @@ pub fn matrix(
     cell: CellMeasure,
     ramp: Option<Ramp>,
 ) -> (VelocityMatrix, Option<Kinked>) {
-    let mut k = integrated(cell, |q| ([1.0 - cut.share[q], cut.share[q]], laws));
+    let mut k = integrated(cell, |q| (shares(cut.share[q], cell), laws));
     let kinked = ramp.and_then(|ramp| {
         let mut kinked = Kinked::new(cut.line, ramp, cell);
         kinked.eliminate(cut, laws, cell, &mut k).then_some(kinked)
@@ -191,6 +192,12 @@ pub fn varying(
     let mut k = integrated(cell, |q| (bounded(cut.share[q]), &laws[q]));
     symmetrize(&mut k);
     k
+}
+
+/// Shares of the two sides at a point. Those of the cut integrate polynomials exactly; hoop rates are none, so
+/// around an axis the shares are bounded.
+fn shares(share: f64, cell: CellMeasure) -> [f64; 2] {
+    if cell.is_ring() { bounded(share) } else { [1.0 - share, share] }
 }
 
 /// Shares of the two sides at a point, between zero and one. Shares that integrate polynomials

@@ -50,7 +50,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     for (name, case) in &list {
         let mut results: Vec<(u32, f64)> = vec![];
         for &n in effort.take(&CELLS) {
-            let e = case.errors(n, &[])?.velocity;
+            let e = case.errors(n, &["accuracy.nonlinear_tolerance=1e-6"])?.velocity;
             let last = results.last();
             let slope = last.map_or(String::new(), |&c| format!("{:.2}", rate(c, (n, e))));
             table.rows.push(vec![(*name).into(), n.to_string(), number(e), slope]);

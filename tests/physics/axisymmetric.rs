@@ -155,7 +155,7 @@ fn impossible_round_scenes_are_refused() {
     let error = |text: &str| {
         let source = SceneSource::new("test", text);
         let scene = parse(&source).unwrap_or_else(|e| panic!("{:?}", e.lines()));
-        format!("{:?}", resolve(&scene).err().expect("refused").with_source(&source).lines())
+        format!("{:?}", resolve(&scene).expect_err("refused").with_source(&source).lines())
     };
     for (more, message) in [
         ("[boundaries]\nleft.kind = \"no_slip\"\n", "the left side is the axis"),

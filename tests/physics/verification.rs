@@ -65,6 +65,10 @@ fn inertia() {
 fn solids() {
     check("solids");
 }
+#[test]
+fn axisymmetric() {
+    check("axisymmetric");
+}
 
 #[test]
 fn every_subject_is_tested() {
