@@ -92,25 +92,22 @@ fn the_mean_stress_of_a_compressible_fluid_is_that_of_its_bulk_viscosity() {
 
 #[test]
 fn far_from_the_axis_the_flow_is_plane() {
-    let rest = "[materials.drop]\nshear_viscosity = 50\ndensity = 1\ncoupling_viscosity = 50\n\
-                internal_length = 0.1\n[materials.fluid]\nshear_viscosity = 1\nbackground = true\n\
-                [[regions]]\nmaterial = \"drop\"\n";
     let text = |radius: f64, geometry: &str| {
         format!(
-            "schema = 1\nname = \"far\"\ngravity = [0, -1]\n[domain]\n{geometry}x = [{radius:?}, {:?}]\n\
-             y = [0, 1]\n[accuracy]\ncells = 12\n[time]\nend = 1\n{rest}\
-             shape.circle = {{ centre = [{:?}, 0.6], radius = 0.2 }}\n",
-            radius + 1.0,
-            radius + 0.5
+            "schema = 1\nname = \"far\"\n[domain]\n{geometry}x = [{radius:?}, {:?}]\ny = [0, 1]\n\
+             [accuracy]\ncells = 12\n[time]\nend = 1\n[materials.fluid]\nshear_viscosity = 1\n\
+             coupling_viscosity = 2\ninternal_length = 0.1\n[[regions]]\nmaterial = \"fluid\"\n\
+             [body_force]\nx = \"sin(3*y)*(x - {radius:?})\"\ny = \"(x - {radius:?})^2 - y\"\n",
+            radius + 1.0
         )
     };
     let plane = scene(&text(0.0, ""), &[]);
     let power = plane.row().dissipation;
-    // The dissipation per length around the axis differs by the square of the curvature.
+    // The dissipation per length around the axis differs by the curvature.
     for radius in [10.0, 100.0, 1000.0] {
         let ring = scene(&text(radius, "geometry = \"axisymmetric\"\n"), &[]);
         let error = ring.row().dissipation / (2.0 * PI * (radius + 0.5)) / power - 1.0;
-        assert!(error.abs() < 0.1 / (radius * radius), "{radius}: {error:e}");
+        assert!(error.abs() < 1.0 / radius, "{radius}: {error:e}");
     }
 }
 
