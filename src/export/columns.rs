@@ -24,7 +24,8 @@ enum Column {
 /// Rows of a table that are written together: named columns of the same length.
 type Group = Vec<(String, Column)>;
 
-/// Writes `particles.parquet`, `fields.parquet`, `stresses.parquet` and `series.parquet`; all but the last have the columns
+/// Writes `particles.parquet`, `fields.parquet`, `stresses.parquet` and `series.parquet`; all but the last
+/// have the columns
 /// `frame` and `time` and one row group per frame. Returns the number of files.
 pub(super) fn write(frames: &Frames, folder: &Path) -> Result<usize, ExportError> {
     let of = |group: &dyn Fn(usize, &Instant) -> Option<Group>| -> Vec<Group> {

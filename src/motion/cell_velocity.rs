@@ -191,7 +191,7 @@ fn values<const FMA: bool>(
 }
 
 /// Coefficients of the biquadratic with the nodal values `nodal(along, across)`, both 0, 1, 2.
-fn biquadratic(nodal: impl Fn(usize, usize) -> f64) -> Coefficients {
+pub(super) fn biquadratic(nodal: impl Fn(usize, usize) -> f64) -> Coefficients {
     let quadratic =
         |[low, middle, high]: [f64; 3]| [middle, 0.5 * (high - low), 0.5 * (high + low) - middle];
     let rows: [[f64; 3]; 3] =
@@ -206,9 +206,12 @@ fn biquadratic(nodal: impl Fn(usize, usize) -> f64) -> Coefficients {
     out
 }
 
+/// The constant `K` of the correction, see the module documentation.
+pub(super) const BOW: f64 = 5.0 / 21.0;
+
 /// A corrected velocity component. `ratio`: (cell size along it / cell size across it)^2.
 fn corrected(own: &Coefficients, other: &Coefficients, ratio: f64) -> Coefficients {
-    const K: f64 = 5.0 / 21.0;
+    const K: f64 = BOW;
     let mut c = *own;
     let straight = other[2][1] / 3.0;
     c[0][1] += straight;

@@ -17,15 +17,11 @@
 //! which changes no flux through the sides. The shares `a` and `b` are those of the plane. At the axis
 //! `E` is zero, so `U` and `V` are divisible by `s` there.
 
-use super::cell_velocity::{AtPoints, Points, TOGETHER, Ways, ways};
+use super::cell_velocity::{AtPoints, BOW, Points, TOGETHER, Ways, biquadratic, ways};
 use crate::simd::{dispatch, multiply_add};
 use crate::space::measure::CellMeasure;
 use crate::space::shape::NODES;
 use nalgebra::Matrix2;
-
-/// Share of the curvature of the velocity that the bow of a cell takes, see
-/// [`cell_velocity`](super::cell_velocity).
-const BOW: f64 = 5.0 / 21.0;
 
 /// Coefficients of `eta^j xi^i`, row `j`, column `i`.
 type Table<const J: usize, const I: usize> = [[f64; I]; J];
@@ -38,28 +34,12 @@ pub struct RingVelocity {
     slope: f64,
 }
 
-/// `c` is `c[j][i]` of `eta^j xi^i` for the nodal values of a cell.
-fn biquadratic(value: impl Fn(usize) -> f64) -> Table<3, 3> {
-    let quadratic =
-        |[low, middle, high]: [f64; 3]| [middle, 0.5 * (high - low), 0.5 * (high + low) - middle];
-    let rows: [[f64; 3]; 3] =
-        std::array::from_fn(|j| quadratic(std::array::from_fn(|i| value(3 * j + i))));
-    let mut out = [[0.0; 3]; 3];
-    for i in 0..3 {
-        let column = quadratic([rows[0][i], rows[1][i], rows[2][i]]);
-        for j in 0..3 {
-            out[j][i] = column[j];
-        }
-    }
-    out
-}
-
 /// Product of a polynomial in `xi` with the thickness `1 + tilt xi`.
-fn thick<const N: usize>(c: &[f64; 3], tilt: f64) -> [f64; N] {
+fn thick<const N: usize>(c: &[f64], tilt: f64) -> [f64; N] {
     let mut out = [0.0; N];
-    for i in 0..3 {
-        out[i] += c[i];
-        out[i + 1] += tilt * c[i];
+    for (i, c) in c.iter().enumerate() {
+        out[i] += c;
+        out[i + 1] += tilt * c;
     }
     out
 }
@@ -162,12 +142,12 @@ impl RingVelocity {
     /// interpolation.
     pub fn new(nodal: &[[f64; 2]; NODES], cell: CellMeasure, corrected: bool) -> Self {
         let ([hx, hy], tilt) = (cell.size, cell.tilt());
-        let of_u = biquadratic(|k| nodal[k][0] * 0.5 * hy);
-        let of_v = biquadratic(|k| nodal[k][1] * 0.5 * hx);
+        let of_u = biquadratic(|i, j| nodal[3 * j + i][0] * 0.5 * hy);
+        let of_v = biquadratic(|i, j| nodal[3 * j + i][1] * 0.5 * hx);
         let mut out = RingVelocity { slope: tilt, ..RingVelocity::default() };
         for j in 0..3 {
-            out.u[j] = thick(&of_u[j], tilt);
-            out.v[j] = thick(&of_v[j], tilt);
+            out.u[j] = thick(&of_u[j][..3], tilt);
+            out.v[j] = thick(&of_v[j][..3], tilt);
         }
         if corrected {
             correct(&mut out.u, &mut out.v, tilt, (hx / hy).powi(2));

@@ -51,14 +51,8 @@ pub struct Member {
 impl Member {
     /// Geometry of the scene, on which units depend; the plane if the scene is unknown.
     pub fn geometry(&self) -> Geometry {
-        let parsed =
-            self.scene_toml.as_ref().and_then(|t| t.parse::<toml_edit::DocumentMut>().ok());
-        let written =
-            parsed.and_then(|t| Some(t.get("domain")?.get("geometry")?.as_str()?.to_owned()));
-        match written.as_deref() {
-            Some("axisymmetric") => Geometry::Axisymmetric,
-            _ => Geometry::Plane,
-        }
+        let round = self.info.as_ref().is_some_and(|info| info.round);
+        if round { Geometry::Axisymmetric } else { Geometry::Plane }
     }
 }
 

@@ -1,9 +1,8 @@
 //! Round flows: exact solutions, invariants, and their limit far from the axis.
 
-use crate::{finish, preset, scene};
+use crate::{finish, preset, scene, volume};
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse};
-use grainscope::sim::Run;
 use std::f64::consts::PI;
 
 /// A scene of a round vessel; `rest` follows the domain.
@@ -15,13 +14,6 @@ fn vessel(x: &str, y: &str, cells: u32, rest: &str) -> String {
 }
 
 const FLUID: &str = "[materials.fluid]\nshear_viscosity = 1\n[[regions]]\nmaterial = \"fluid\"\n";
-
-/// Volume of a material, m3.
-fn volume(run: &dyn Run, name: &str) -> f64 {
-    let plan = run.plan();
-    let m = plan.state.materials.iter().position(|m| m.name == name).unwrap();
-    run.particles().volume_of(m) * plan.units.volume()
-}
 
 #[test]
 fn uniform_extension_is_exact() {
@@ -49,7 +41,7 @@ fn uniform_extension_is_exact() {
 
 #[test]
 fn a_thread_resists_extension_with_three_viscosities() {
-    // Troutons's ratio: the axial stress of a thread in thin air is 3 eta times the rate.
+    // Trouton's ratio: the axial stress of a thread in thin air is 3 eta times the rate.
     let materials = "[materials.thread]\nshear_viscosity = 1\n[materials.air]\nshear_viscosity = 1e-6\n\
                      background = true\n[[regions]]\nmaterial = \"thread\"\n\
                      shape.rectangle = { x = [0, 0.5], y = [0, 1] }\n";

@@ -2,7 +2,7 @@
 //! the values it carries, and its momentum.
 
 use crate::openings::flux;
-use crate::{finish, scene};
+use crate::{finish, scene, volume};
 use grainscope::sim::Run;
 
 /// Sand is pushed into a channel filled with air, through the left side or a part of it; the right
@@ -58,11 +58,7 @@ material = "air"
 
 /// Volumes of sand and air inside, m2.
 fn inside(run: &dyn Run) -> [f64; 2] {
-    let plan = run.plan();
-    ["sand", "air"].map(|name| {
-        let m = plan.state.materials.iter().position(|m| m.name == name).unwrap();
-        run.particles().volume_of(m) * plan.units.volume()
-    })
+    ["sand", "air"].map(|name| volume(run, name))
 }
 
 fn gauge(run: &dyn Run, name: &str) -> f64 {

@@ -53,3 +53,10 @@ pub fn finish(run: &mut dyn Run, mut each: impl FnMut(&dyn Run)) {
         each(run);
     }
 }
+
+/// Volume of a material, m3 around an axis, m2 in the plane.
+pub fn volume(run: &dyn Run, name: &str) -> f64 {
+    let plan = run.plan();
+    let m = plan.state.materials.iter().position(|m| m.name == name).unwrap();
+    run.particles().volume_of(m) * plan.units.volume()
+}

@@ -1,7 +1,7 @@
 //! Openings in the sides of the domain: balances, symmetry, an exact solution, and particles that
 //! leave only through openings.
 
-use crate::scene;
+use crate::{scene, volume};
 use grainscope::sim::Run;
 
 /// A box whose fluid leaves through a slit in the floor; the top is open.
@@ -102,15 +102,10 @@ fn what_flows_in_at_the_top_flows_out_of_the_slit() {
 fn particles_leave_only_through_the_slit_and_the_background_takes_their_place() {
     // Later the surface reaches the slit.
     let mut run = scene(SLIT, &["accuracy.cells=6", "time.end=20"]);
-    let area = |run: &dyn Run, m: &str| {
-        let plan = run.plan();
-        let m = plan.state.materials.iter().position(|k| k.name == m).unwrap();
-        run.particles().volume_of(m) * plan.units.volume()
-    };
-    let start = [area(&*run, "fluid"), area(&*run, "air")];
+    let start = [volume(&*run, "fluid"), volume(&*run, "air")];
     while !run.is_finished() {
         run.step().unwrap();
-        let [fluid, air] = [area(&*run, "fluid"), area(&*run, "air")];
+        let [fluid, air] = [volume(&*run, "fluid"), volume(&*run, "air")];
         let [slit, air_out, air_in] = [0, 1, 2].map(|k| run.row().gauges[k].volume);
         assert!((start[0] - slit - fluid).abs() < 1e-11, "{fluid} {slit}");
         assert!((start[1] + air_in - air_out - air).abs() < 1e-11, "{air} {air_in} {air_out}");

@@ -1,7 +1,6 @@
 //! Nozzles inside the domain: exact volumes, symmetry, times, and free paths.
 
-use crate::{finish, scene};
-use grainscope::sim::Run;
+use crate::{finish, scene, volume};
 
 /// A nozzle above the middle of a box of air with open sides.
 const SPOUT: &str = r#"schema = 1
@@ -36,12 +35,6 @@ material = "syrup"
 speed = 0.8
 to_time = 0.3
 "#;
-
-fn volume(run: &dyn Run, name: &str) -> f64 {
-    let plan = run.plan();
-    let m = plan.state.materials.iter().position(|m| m.name == name).unwrap();
-    run.particles().volume_of(m) * plan.units.volume()
-}
 
 #[test]
 fn a_nozzle_adds_its_volume_to_rounding_and_stops() {

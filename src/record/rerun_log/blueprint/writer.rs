@@ -46,13 +46,7 @@ impl Writer<'_> {
     /// The view of a round flow in three dimensions.
     pub(super) fn round(&mut self, paths: &Paths) -> Result<Node, RecordError> {
         let node = self.view("3D", "Round", &paths.at("round").to_string(), &["+ $origin/**"])?;
-        let [r, g, b] = PAPER;
-        self.property(
-            &node,
-            "Background",
-            &archetypes::Background::new(components::BackgroundKind::SolidColor)
-                .with_color(Color::from_rgb(r, g, b)),
-        )?;
+        self.on_paper(&node)?;
         Ok(node)
     }
 
@@ -112,14 +106,15 @@ impl Writer<'_> {
                 y_range: range(-seen.max[1], -seen.min[1]),
             })),
         )?;
-        let [r, g, b] = PAPER;
-        self.property(
-            &node,
-            "Background",
-            &archetypes::Background::new(components::BackgroundKind::SolidColor)
-                .with_color(Color::from_rgb(r, g, b)),
-        )?;
+        self.on_paper(&node)?;
         Ok(node)
+    }
+
+    /// Gives a view the background of all pictures.
+    fn on_paper(&self, view: &Node) -> Result<(), RecordError> {
+        let [r, g, b] = PAPER;
+        let plain = archetypes::Background::new(components::BackgroundKind::SolidColor);
+        self.property(view, "Background", &plain.with_color(Color::from_rgb(r, g, b)))
     }
 
     pub(super) fn plot(&mut self, plot: &Plot, paths: &Paths) -> Result<Node, RecordError> {
