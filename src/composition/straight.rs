@@ -16,7 +16,9 @@
 //! particles along it.
 
 use super::interface::fade;
-use crate::space::shape::{GAUSS_6, SUBPOINTS, lagrange_6};
+use crate::space::shape::{
+    GAUSS_3, GAUSS_3_WEIGHTS, GAUSS_6, GaussPoint, SUBPOINTS, Shape, lagrange_6,
+};
 
 /// Ratio of the distance of the material's centroid from the centre of the cell to that of its side
 /// of the line, below which the material does not lie on one side (drops, sheets, debris), and from
@@ -34,6 +36,14 @@ pub struct StraightCut {
     pub line: [f64; 3],
     /// 1 if the material certainly lies on one side of the line, 0 if it does not.
     pub trust: f64,
+    /// The smaller side.
+    lesser: Side,
+    /// Which side is the smaller one: 1 for that of the material.
+    lesser_side: usize,
+    /// Whether `y` of the smaller side is the first coordinate of the cell.
+    turned: bool,
+    /// Signs of the reference coordinates of the smaller side's corner.
+    corner: [f64; 2],
 }
 
 impl StraightCut {
@@ -47,7 +57,37 @@ impl StraightCut {
         let mut cut = Self::of_lesser(rest, centroid.map(|c| -c * share / rest))?;
         cut.share.iter_mut().for_each(|s| *s = 1.0 - *s);
         cut.line = cut.line.map(|l| -l);
+        cut.lesser_side = 0;
         Some(cut)
+    }
+
+    /// Integration points of both sides, with the index of their side: 0 for the rest, 1 for the material.
+    ///
+    /// The rule is exact for products of the gradients of two biquadratic velocities with a linear
+    /// thickness, and all its weights are positive: a form that is not negative at any point stays so.
+    pub fn points(&self) -> impl Iterator<Item = (usize, GaussPoint)> + '_ {
+        let Side { width, height: [a, b] } = self.lesser;
+        let other = 1 - self.lesser_side;
+        // Ranges of x, and of y at both ends of that of x.
+        let parts = [
+            (self.lesser_side, [0.0, width], [[0.0, a], [0.0, b]]),
+            (other, [0.0, width], [[a, 2.0], [b, 2.0]]),
+            (other, [width, 2.0], [[0.0, 2.0]; 2]),
+        ];
+        parts.into_iter().flat_map(move |(side, x, y)| {
+            let points = if x[1] > x[0] { GAUSS_6.len() * GAUSS_3.len() } else { 0 };
+            (0..points).map(move |k| {
+                let ((s, ws), t) = (GAUSS_6[k % 6], GAUSS_3[k / 6]);
+                let between = |[from, to]: [f64; 2], t: f64| from + 0.5 * (1.0 + t) * (to - from);
+                let [low, high] = [0, 1].map(|end| between([y[0][end], y[1][end]], s));
+                let area = (x[1] - x[0]) * (high - low);
+                let [x, y] = [between(x, s), between([low, high], t)];
+                let at = if self.turned { [y, x] } else { [x, y] };
+                let r = [0, 1].map(|c| self.corner[c] * (1.0 - at[c]));
+                let weight = 0.25 * ws * GAUSS_3_WEIGHTS[k / 6] * area;
+                (side, GaussPoint { r, weight, shape: Shape::at(r) })
+            })
+        })
     }
 
     /// The cut for a material that fills at most half of the cell.
@@ -75,12 +115,22 @@ impl StraightCut {
         let mut line = [1.0 - side.height[0] - slope, 0.0, 0.0];
         line[1 + along] = -centroid[along].signum();
         line[2 - along] = slope * centroid[1 - along].signum();
-        Some(StraightCut { share, line, trust })
+        let corner = centroid.map(f64::signum);
+        Some(StraightCut {
+            share,
+            line,
+            trust,
+            lesser: side,
+            lesser_side: 1,
+            turned: along == 0,
+            corner,
+        })
     }
 }
 
 /// The side of the material, `0 <= x <= width` and `0 <= y <= height[0] + (height[1] - height[0])
 /// x/width`, in the coordinates of the module documentation.
+#[derive(Clone, Copy, Debug)]
 struct Side {
     width: f64,
     height: [f64; 2],
@@ -182,6 +232,16 @@ mod tests {
                 let [found, truth] = [moment(&cut, powers), exact(n, c, powers)];
                 assert!((found - truth).abs() < 1e-6, "{n:?} {c} {powers:?}: {found} {truth}");
             }
+            for powers in [[0, 0], [1, 0], [0, 1], [2, 1], [5, 0], [4, 1], [0, 4]] {
+                let points = cut.points().filter(|(side, _)| *side == 1).map(|(_, g)| {
+                    assert!(g.weight >= 0.0 && g.r.iter().all(|r| r.abs() <= 1.0));
+                    g.weight * g.r[0].powi(powers[0]) * g.r[1].powi(powers[1])
+                });
+                let [found, truth] = [points.sum::<f64>(), exact(n, c, powers)];
+                assert!((found - truth).abs() < 1e-6, "{n:?} {c} {powers:?}: {found} {truth}");
+            }
+            let all: f64 = cut.points().map(|(_, g)| g.weight).sum();
+            assert!((all - 1.0).abs() < 1e-14);
             let [l, x, y] = cut.line;
             let length = x.hypot(y);
             let found = [-x / length - n[0], -y / length - n[1], l / length - c];

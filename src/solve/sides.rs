@@ -5,8 +5,8 @@
 //! K = sum over both sides of  integral over the side of  d~.S d + beta tr~ tr
 //! ```
 //! The integrals are exact. For any line the matrix is therefore positive semi-definite, and a cell
-//! that is mostly filled by the stiff fluid keeps its stiffness. (Around an axis the weights of the points are
-//! positive instead, which has the same effect.)
+//! that is mostly filled by the stiff fluid keeps its stiffness. (Around an axis the hoop rate is no
+//! polynomial; there the rule has points in each side, with positive weights.)
 //!
 //! **Kink.** Where the viscosities differ, the true velocity along the line has a kink, which a
 //! biquadratic velocity cannot have. The kink
@@ -115,10 +115,9 @@ impl Kinked {
         let mut driven = [0.0; 2 * NODES];
         let mut coupled = [0.0; 2 * NODES];
         let mut itself = 0.0;
-        for (g, &share) in GAUSS_6X6.iter().zip(&cut.share) {
+        integrate(cut, cell, |g, shares| {
             let s = PointShape::new(&g.shape, cell, g.r[0]);
             let rates = self.rates(g, cell);
-            let shares = shares(share, cell);
             for side in 0..2 {
                 let volume = cell.of_point(g.weight * shares[side], g.r[0]);
                 itself += volume * laws[side].power(&rates[side]);
@@ -127,7 +126,7 @@ impl Kinked {
                     add_forces(&mut driven, &s, &difference, &rates[side], volume);
                 }
             }
-        }
+        });
         if itself <= 0.0 {
             return false;
         }
@@ -173,7 +172,8 @@ pub fn matrix(
     cell: CellMeasure,
     ramp: Option<Ramp>,
 ) -> (VelocityMatrix, Option<Kinked>) {
-    let mut k = integrated(cell, |q| (shares(cut.share[q], cell), laws));
+    let mut k = [[0.0; 2 * NODES]; 2 * NODES];
+    integrate(cut, cell, |g, shares| add_point(&mut k, g, cell, shares, laws));
     let kinked = ramp.and_then(|ramp| {
         let mut kinked = Kinked::new(cut.line, ramp, cell);
         kinked.eliminate(cut, laws, cell, &mut k).then_some(kinked)
@@ -189,15 +189,27 @@ pub fn varying(
     laws: &[[PointLaw; 2]; SUBPOINTS],
     cell: CellMeasure,
 ) -> VelocityMatrix {
-    let mut k = integrated(cell, |q| (bounded(cut.share[q]), &laws[q]));
+    let mut k = [[0.0; 2 * NODES]; 2 * NODES];
+    for (q, g) in GAUSS_6X6.iter().enumerate() {
+        add_point(&mut k, g, cell, bounded(cut.share[q]), &laws[q]);
+    }
     symmetrize(&mut k);
     k
 }
 
-/// Shares of the two sides at a point. Those of the cut integrate polynomials exactly; hoop rates are none, so
-/// around an axis the shares are bounded.
-fn shares(share: f64, cell: CellMeasure) -> [f64; 2] {
-    if cell.is_ring() { bounded(share) } else { [1.0 - share, share] }
+/// Calls `f` with the points of a rule for both sides and the shares of the sides at each. In the plane the
+/// rule is exact; around an axis all shares are zero or one, so that hoop rates cannot make a matrix
+/// indefinite.
+fn integrate(cut: &StraightCut, cell: CellMeasure, mut f: impl FnMut(&GaussPoint, [f64; 2])) {
+    if cell.is_ring() {
+        for (side, g) in cut.points() {
+            f(&g, if side == 0 { [1.0, 0.0] } else { [0.0, 1.0] });
+        }
+    } else {
+        for (g, &share) in GAUSS_6X6.iter().zip(&cut.share) {
+            f(g, [1.0 - share, share]);
+        }
+    }
 }
 
 /// Shares of the two sides at a point, between zero and one. Shares that integrate polynomials
@@ -208,31 +220,29 @@ pub fn bounded(share: f64) -> [f64; 2] {
     [1.0 - share, share]
 }
 
-/// Integral over both sides, with the shares and the laws of the two materials at each point.
-fn integrated<'a>(
+/// Adds the stiffness at a point, with the shares and the laws of the two materials there.
+fn add_point(
+    k: &mut VelocityMatrix,
+    g: &GaussPoint,
     cell: CellMeasure,
-    at: impl Fn(usize) -> ([f64; 2], &'a [PointLaw; 2]),
-) -> VelocityMatrix {
-    let mut k: VelocityMatrix = [[0.0; 2 * NODES]; 2 * NODES];
-    for (q, g) in GAUSS_6X6.iter().enumerate() {
-        let ([first, second], laws) = at(q);
-        let mut mixture = Mixture::parallel();
-        mixture.add(first, &laws[0]);
-        mixture.add(second, &laws[1]);
-        let (s, law) = (PointShape::new(&g.shape, cell, g.r[0]), mixture.law());
-        for (i, row) in k.iter_mut().enumerate() {
-            let slope = [s.gx[i % NODES], s.gy[i % NODES]];
-            let mut gradient = [[0.0; 2]; 2];
-            gradient[i / NODES] = slope;
-            let mut rates = Rates::classical(gradient);
-            if cell.is_ring() {
-                let along = if i < NODES { s.n[i] } else { 0.0 };
-                rates = rates.around_axis(s.per_radius * along, 0.0);
-            }
-            add_forces(row, &s, &law, &rates, cell.of_point(g.weight, g.r[0]));
+    [first, second]: [f64; 2],
+    laws: &[PointLaw; 2],
+) {
+    let mut mixture = Mixture::parallel();
+    mixture.add(first, &laws[0]);
+    mixture.add(second, &laws[1]);
+    let (s, law) = (PointShape::new(&g.shape, cell, g.r[0]), mixture.law());
+    for (i, row) in k.iter_mut().enumerate() {
+        let slope = [s.gx[i % NODES], s.gy[i % NODES]];
+        let mut gradient = [[0.0; 2]; 2];
+        gradient[i / NODES] = slope;
+        let mut rates = Rates::classical(gradient);
+        if cell.is_ring() {
+            let along = if i < NODES { s.n[i] } else { 0.0 };
+            rates = rates.around_axis(s.per_radius * along, 0.0);
         }
+        add_forces(row, &s, &law, &rates, cell.of_point(g.weight, g.r[0]));
     }
-    k
 }
 
 /// Copies the lower triangle to the upper one: rounding differs between the two.
@@ -315,9 +325,12 @@ mod tests {
                 add_stiffness::<2>(&mut uniform, &shape, &law(2.0), volume);
             }
             mirror::<2>(&mut uniform);
+            // Around an axis, no rule is exact for hoop rates.
+            let most = if cell.is_ring() { 1e-6 } else { 1e-11 };
             for i in 0..18 {
                 for j in 0..18 {
-                    assert!((k[i][j] - uniform[i][j]).abs() < 1e-11);
+                    let off = (k[i][j] - uniform[i][j]).abs();
+                    assert!(off < most, "{i} {j}: {off}");
                 }
             }
         }

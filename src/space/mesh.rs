@@ -130,6 +130,12 @@ impl Axis {
         if on_next && cell + 2 < self.lines.len() { cell + 1 } else { cell }
     }
 
+    /// The coordinate nearest to `x` that is not beyond an end; `x` itself on a periodic axis.
+    #[inline(always)]
+    fn nearest_inside(&self, x: f64) -> f64 {
+        if self.periodic { x } else { x.max(self.lines[0]).min(self.lines[self.lines.len() - 1]) }
+    }
+
     /// Maps a coordinate into the range of a periodic axis; does nothing on other axes.
     pub fn wrap(&self, x: f64) -> f64 {
         let end = self.end() - ON_LINE * self.size(self.cells() - 1);
@@ -277,7 +283,7 @@ impl Mesh {
     pub fn cell_volume(&self, cell: usize) -> f64 {
         self.cell_measure(cell).volume()
     }
-    /// Measure of a side of a cell, an index into [`SIDE_NODES`](super::shape::SIDE_NODES).
+    /// Measure of a side of a cell: 0 left, 1 right, 2 lower, 3 upper.
     pub fn face(&self, cell: usize, side: usize) -> FaceMeasure {
         self.whole_measure(cell).of_side(side)
     }
@@ -330,6 +336,11 @@ impl Mesh {
     /// Maps a point into the domain along periodic axes.
     pub fn wrap(&self, p: [f64; 2]) -> [f64; 2] {
         [self.x.wrap(p[0]), self.y.wrap(p[1])]
+    }
+    /// The point nearest to a point that is not beyond a side of the domain.
+    #[inline(always)]
+    pub fn nearest_inside(&self, p: [f64; 2]) -> [f64; 2] {
+        [self.x.nearest_inside(p[0]), self.y.nearest_inside(p[1])]
     }
     /// The cells that share a corner with a cell, including itself and periodic neighbours; at most
     /// nine.
