@@ -51,7 +51,7 @@ pub struct Inertia {
     /// Contributions of the cells.
     cells: Vec<Cell>,
     /// Density in units of the inertial density.
-    density: f64,
+    pub density: f64,
 }
 
 /// Mass matrix and load of a cell.
@@ -86,11 +86,11 @@ impl Inertia {
     }
 
     /// Ends the step to the first flow, whose nodal velocities are `velocity`: it determines the
-    /// accelerations.
-    pub fn begin(&mut self, plan: &Plan, velocity: impl Fn(usize) -> [f64; 2]) {
+    /// accelerations if they are `regular`.
+    pub fn begin(&mut self, plan: &Plan, regular: bool, velocity: impl Fn(usize) -> [f64; 2]) {
         let [last, before] = &mut self.past;
         *before = None;
-        let Some(impulse) = last.take() else { return };
+        let Some(impulse) = last.take().filter(|_| regular) else { return };
         let mesh = &*plan.mesh;
         let back = reversed(plan, &mut self.backwards[0], &impulse);
         let acceleration = (0..mesh.nodes()).map(|node| {
@@ -206,7 +206,7 @@ fn end(mesh: &Mesh, way: &Displacement) -> (usize, [f64; 2]) {
 }
 
 /// Nodal values interpolated at a point of a cell.
-fn interpolated(mesh: &Mesh, nodal: &[[f64; 2]], (cell, at): (usize, [f64; 2])) -> [f64; 2] {
+pub fn interpolated(mesh: &Mesh, nodal: &[[f64; 2]], (cell, at): (usize, [f64; 2])) -> [f64; 2] {
     let r = mesh.to_reference(cell, at).map(|r| r.clamp(-1.0, 1.0));
     interpolate(&mesh.cell_nodes(cell).map(|n| nodal[n]), &Shape::values(r))
 }

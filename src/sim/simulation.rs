@@ -20,7 +20,7 @@ use crate::solve::quadrature::Quadrature;
 use crate::solve::report::Report;
 use crate::solve::stokes::Stokes;
 use crate::solve::terms::Terms;
-use crate::space::count::Count;
+use crate::space::count::{Count, Crossing};
 use crate::space::flow::Flow;
 use crate::space::neighbours::{Face, Neighbours, open_faces};
 use crate::space::particles::Particles;
@@ -101,6 +101,8 @@ pub struct Simulation<const D: usize> {
     pub(super) flowed: [f64; 2],
     /// Potential energy at the start, J/m.
     pub(super) first_energy: f64,
+    /// What has crossed the sides and is not yet counted.
+    pub(super) crossings: Vec<Crossing>,
     pub(super) row: Row,
     pub(super) report: Report,
     /// Forces of the materials on the supports, by node; empty without gauges of forces.
@@ -187,6 +189,7 @@ impl<const D: usize> Simulation<D> {
             last_other_power: 0.0,
             flowed: [0.0; 2],
             first_energy: 0.0,
+            crossings: Vec::new(),
             recent_energy: [0.0; 2],
             row: Row::empty(plan.state.materials.len()),
             report: Report::default(),
@@ -207,7 +210,10 @@ impl<const D: usize> Simulation<D> {
         sim.start_moving(&mut seconds)?;
         sim.solve(None, &mut seconds)?;
         if let Some(inertia) = &mut sim.inertia {
-            inertia.begin(&sim.plan, |node| {
+            // A flow that sides set in motion at once has unbounded accelerations beside them: the first
+            // step does not use them.
+            let regular = !sim.stokes.is_driven();
+            inertia.begin(&sim.plan, regular, |node| {
                 let u = sim.flow.velocity[node];
                 [u[0], u[1]]
             });

@@ -93,8 +93,8 @@ impl<const D: usize> Simulation<D> {
     /// With inertia, finds the first flow: the initial velocity without its divergence.
     ///
     /// The first flow is that after a step so short that only inertia and pressure act in it. If
-    /// material moves, it is solved for twice, so that the pressure is that of the flow and not that
-    /// of the impulse that removes the divergence.
+    /// material or a side moves, it is solved for twice, so that acceleration and pressure are those of the
+    /// flow and not those of the impulse that removes the divergence.
     pub(super) fn start_moving(&mut self, seconds: &mut Phases) -> Result<(), SimError> {
         let plan = self.plan.clone();
         let Some(inertia) = &mut self.inertia else { return Ok(()) };
@@ -109,7 +109,7 @@ impl<const D: usize> Simulation<D> {
         let half = vec![[0.0; 2]; mesh.nodes()];
         let dt = IMPULSE * plan.clock.end.min(1.0);
         inertia.enter(Past { velocity, half, dt, parts: 1 });
-        if plan.initial_velocity.is_some() {
+        if plan.initial_velocity.is_some() || self.stokes.is_driven() {
             self.solve(None, seconds)?;
             let mut velocity = Vec::new();
             self.flow.translation(&mut velocity);

@@ -85,6 +85,11 @@ impl<const D: usize> Stokes<D> {
         self.constraints = constraints;
     }
 
+    /// Whether a velocity other than zero is prescribed.
+    pub fn is_driven(&self) -> bool {
+        self.constraints.move_something()
+    }
+
     /// Number of velocity and rotation unknowns, including condensed ones.
     pub fn unknowns(&self) -> usize {
         self.mesh.nodes() * D

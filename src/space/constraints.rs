@@ -94,6 +94,13 @@ impl<const D: usize> Constraints<D> {
         self.fixed[node][c].then_some(self.value[node][c])
     }
 
+    /// Whether a velocity other than zero is prescribed.
+    pub fn move_something(&self) -> bool {
+        let moves =
+            |(fixed, value): (&[bool; D], &[f64; D])| (0..2).any(|c| fixed[c] && value[c] != 0.0);
+        self.fixed.iter().zip(&self.value).any(moves)
+    }
+
     /// The sides of a cell on which the velocity is prescribed.
     pub fn fixed_sides(&self, mesh: &Mesh, cell: usize) -> FixedSides {
         let nodes = mesh.cell_nodes(cell);
