@@ -227,6 +227,11 @@ impl Gathered {
         &self.volume
     }
 
+    /// Whether the cell has particles of one material only.
+    pub fn is_of_one_material(&self) -> bool {
+        self.volume.iter().filter(|&&v| v > 0.0).count() == 1
+    }
+
     /// Orientation of a material's directors near a Gauss point.
     pub fn orientation(&self, material: usize, g: usize) -> &Orientation {
         &self.orientation[9 * material + g]

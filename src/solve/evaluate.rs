@@ -99,7 +99,7 @@ impl Evaluation<'_> {
         let softened = match &form {
             Form::Sides { cut, .. } => 1.0 - cut.trust,
             Form::Film | Form::Weights => 1.0,
-            Form::Mixture if scratch.volumes().iter().filter(|&&v| v > 0.0).count() == 1 => 1.0,
+            Form::Mixture if scratch.is_of_one_material() => 1.0,
             Form::Cut { .. } | Form::Drops { .. } | Form::Mixture => 0.0,
         };
         let film = matches!(form, Form::Film);
@@ -200,6 +200,7 @@ impl Evaluation<'_> {
     ) {
         out.fractions.fill(0.0);
         (*out.mean_viscosity, *out.compliance) = (0.0, 0.0);
+        let alone = scratch.is_of_one_material();
         for g in 0..9 {
             let IntegrationPoint { r, weight, .. } = out.points[g];
             let mut mixture = empty;
@@ -216,6 +217,9 @@ impl Evaluation<'_> {
                 *out.compliance += weight * phi * material.law.compliance;
                 if softened > 0.0 {
                     let place = self.place(cell, g, r);
+                    // The coupling viscosity of a mixture is less than the sum of its materials'.
+                    let softening =
+                        if alone { softening } else { softening.map(Softening::of_shear) };
                     out.soften(place, weight * phi * softened, softening);
                 }
             }
