@@ -38,6 +38,9 @@ enum Name {
     Hourglass,
     /// Discharge rate of grains against the aperture (Beverloo's law)
     Beverloo,
+    /// Discharge rate of grains from a round hole against its diameter
+    #[value(name = "round_beverloo")]
+    RoundBeverloo,
     /// Width of a shear band of grains against the mesh size, with and without internal length
     Bands,
     /// Discharge of a round and of a plane silo against the internal length
@@ -52,6 +55,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Name::Alignment => paper::ALIGNMENT.name,
         Name::Hourglass => "hourglass",
         Name::Beverloo => "beverloo",
+        Name::RoundBeverloo => "round_beverloo",
         Name::Bands => "bands",
         Name::RoundSilo => "round_silo",
     };
@@ -61,7 +65,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Name::Silo => paper::make(&paper::SILO, args, &out),
         Name::Alignment => paper::make(&paper::ALIGNMENT, args, &out),
         Name::Hourglass => discharge::hourglass(args, &out),
-        Name::Beverloo => discharge::beverloo(args, &out),
+        Name::Beverloo => discharge::beverloo(&discharge::SLIT, args, &out),
+        Name::RoundBeverloo => discharge::beverloo(&discharge::HOLE, args, &out),
         Name::Bands => bands::make(args, &out),
         Name::RoundSilo => round_silo::make(args, &out),
     }?;

@@ -3,7 +3,7 @@
 use super::frozen_flow::{CELL_GRAIN, FrozenFlow};
 use super::gauges::Counter;
 use crate::plan::EffectSet;
-use crate::space::count::Count;
+use crate::space::count::{Count, Crossing};
 use crate::space::particles::{GONE, GRAIN, Particles};
 use crate::threads::{self, Divisible};
 
@@ -80,7 +80,7 @@ impl Divisible for Members<'_> {
 
 /// Advects all particles through a step. `particles` must be sorted by cell and are sorted
 /// afterwards. `compliant`: whether the particle volumes of a material follow the flow; their mass
-/// is constant.
+/// is constant. What leaves the domain is added to `crossings`.
 pub fn advance(
     frozen_flow: &FrozenFlow,
     particles: &mut Particles,
@@ -88,7 +88,7 @@ pub fn advance(
     effects: &EffectSet,
     compliant: impl Fn(u8) -> bool + Sync,
     gauges: &mut [Counter],
-    count: &mut Count,
+    (count, crossings): (&mut Count, &mut Vec<Crossing>),
 ) {
     let mesh = frozen_flow.mesh;
     displacements.make_room(particles, effects);
@@ -128,8 +128,13 @@ pub fn advance(
     }
     count.held += held.iter().filter(|&&held| held).count() as u64;
     for (p, _) in cell.iter().enumerate().filter(|&(_, &cell)| cell == GONE) {
-        count.left += 1;
-        count.volume_out += particles.volume[p];
+        crossings.push(Crossing {
+            enters: false,
+            material: particles.material[p],
+            volume: particles.volume[p],
+            density: particles.density.as_ref().map(|density| density[p]),
+            at: mesh.nearest_inside(to[p]),
+        });
     }
     if mesh.x.periodic() || mesh.y.periodic() {
         threads::for_each(to, GRAIN, |_, p| *p = mesh.wrap(*p));

@@ -274,6 +274,8 @@ impl<'a> FrozenFlow<'a> {
         let mean = |c: usize| (k1[c] + 2.0 * (k2[c] + k3[c]) + k4[c]) / 6.0;
         let goal = [p[0] + dt * mean(0), p[1] + dt * mean(1)];
         if let Some((cell, _)) = home.near(goal) {
+            // A side may be crossed by rounding.
+            let goal = self.mesh.nearest_inside(goal);
             return Displacement { to: goal, left: false, held: false, middle, cell: Some(cell) };
         }
         let (to, left, held) =
@@ -310,7 +312,9 @@ impl<'a> FrozenFlow<'a> {
             let ways = self.velocities.trace(self.simd, cell, &r, step);
             for (k, &p) in points.iter().enumerate() {
                 let displacement = if ways.inside[k] {
+                    // A side may be crossed by rounding.
                     let to = [0, 1].map(|c| p[c] + dt * ways.velocity[c][k]);
+                    let to = self.mesh.nearest_inside(to);
                     let middle = (cell, [ways.middle[0][k], ways.middle[1][k]]);
                     Displacement { to, left: false, held: false, middle, cell: Some(cell) }
                 } else {

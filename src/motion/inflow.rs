@@ -15,6 +15,7 @@
 
 use super::gauges::Counter;
 use crate::plan::{Entering, InitialFields, Plan};
+use crate::space::count::Crossing;
 use crate::space::mesh::{INSIDE, Mesh};
 use crate::space::particles::Particles;
 use crate::space::shape::{SIDE_NODES, Shape, side_normal};
@@ -49,8 +50,9 @@ struct Entry {
     volume: f64,
     /// Its position at the end of the step.
     at: [f64; 2],
-    /// A point on the other side of the face from which it came.
+    /// A point on the other side of the face from which it came, and one on the face.
     from: [f64; 2],
+    through: [f64; 2],
     /// Director, viscosity and density that it carries.
     carried: ([f64; 2], [f64; 2]),
 }
@@ -95,24 +97,31 @@ impl Inflow {
     }
 
     /// Adds what enters in a step of length `dt` with the nodal velocities `velocity`, counts it at
-    /// the gauges, and returns its volume. `particles` must be sorted, and are sorted on return.
+    /// the gauges, and adds it to `crossings`. `particles` must be sorted, and are sorted on return.
     pub fn enter(
         &self,
         plan: &Plan,
         (velocity, dt): (&[[f64; 2]], f64),
         particles: &mut Particles,
         gauges: &mut [Counter],
-    ) -> f64 {
+        crossings: &mut Vec<Crossing>,
+    ) {
         let mesh = &*plan.mesh;
         let before = particles.len();
-        let mut sum = 0.0;
         for face in &self.faces {
             for k in 0..self.particles_along {
                 self.entries(plan, (velocity, dt), face, k, |entry| {
                     for gauge in gauges.iter_mut() {
                         gauge.pass(mesh, entry.from, entry.at, entry.material, entry.volume);
                     }
-                    sum += entry.volume;
+                    let Entry { material, volume, through, .. } = entry;
+                    crossings.push(Crossing {
+                        enters: true,
+                        material,
+                        volume,
+                        density: particles.density.is_some().then_some(entry.carried.1[1]),
+                        at: through,
+                    });
                     self.add(mesh, particles, &entry);
                 });
             }
@@ -120,7 +129,6 @@ impl Inflow {
         if particles.len() != before {
             particles.sort(mesh);
         }
-        sum
     }
 
     /// Calls `add` with what enters through part `k` of the parts of equal size of a face.
@@ -186,13 +194,14 @@ impl Inflow {
                     (cell, at) = (home, point(0.5 * (1.0 + INSIDE), along));
                 }
             }
-            let from = point(-inside, middle);
+            let [from, through] = [-inside, 0.0].map(|inside| point(inside, middle));
             if let Some(part) = mesh.part(cell)
                 && mesh.is_solid_in(cell, at)
             {
                 at = mesh.free_place(cell, part);
             }
-            add(Entry { cell, material, volume: volume / parts, at, from, carried });
+            let volume = volume / parts;
+            add(Entry { cell, material, volume, at, from, through, carried });
         }
     }
 

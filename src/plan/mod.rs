@@ -357,11 +357,11 @@ impl Plan {
     }
 
     /// Whether the energy of the particles and the work of loads determine the energy balance:
-    /// gravity or inertia acts, gravity not along a periodic axis, no side has an opening, and volumes are constant.
+    /// gravity or inertia acts, gravity not along a periodic axis, and volumes are constant.
     pub fn energy_tells(&self) -> bool {
         let (mesh, g) = (&self.mesh, self.state.gravity);
         let along_seam = mesh.x.periodic() && g[0] != 0.0 || mesh.y.periodic() && g[1] != 0.0;
-        let constant = !self.exchanges_volume() && !self.effects.volume_change;
+        let constant = !self.effects.volume_change;
         (self.effects.gravity || self.effects.inertia) && constant && !along_seam
     }
 

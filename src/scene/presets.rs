@@ -5,7 +5,7 @@ use super::load::parse;
 use super::source::SceneSource;
 
 /// Names and TOML texts of the presets.
-const PRESETS: [(&str, &str); 25] = [
+const PRESETS: [(&str, &str); 27] = [
     ("silo", include_str!("../../presets/silo.toml")),
     ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
     ("couette_cosserat", include_str!("../../presets/couette_cosserat.toml")),
@@ -19,6 +19,7 @@ const PRESETS: [(&str, &str); 25] = [
     ("hourglass", include_str!("../../presets/hourglass.toml")),
     ("clepsydra", include_str!("../../presets/clepsydra.toml")),
     ("column_collapse", include_str!("../../presets/column_collapse.toml")),
+    ("heap", include_str!("../../presets/heap.toml")),
     ("incline", include_str!("../../presets/incline.toml")),
     ("bingham_slump", include_str!("../../presets/bingham_slump.toml")),
     ("pour", include_str!("../../presets/pour.toml")),
@@ -27,6 +28,7 @@ const PRESETS: [(&str, &str); 25] = [
     ("flow_past_cylinder", include_str!("../../presets/flow_past_cylinder.toml")),
     ("piston", include_str!("../../presets/piston.toml")),
     ("round_silo", include_str!("../../presets/round_silo.toml")),
+    ("round_hourglass", include_str!("../../presets/round_hourglass.toml")),
     ("pipe_cosserat", include_str!("../../presets/pipe_cosserat.toml")),
     ("sampson", include_str!("../../presets/sampson.toml")),
     ("falling_drop", include_str!("../../presets/falling_drop.toml")),

@@ -53,6 +53,7 @@ pub struct Scene {
     pub materials: IndexMap<String, Material>,
     /// Regions that are filled with materials at the start; where they overlap, the last one
     /// counts.
+    #[serde(default)]
     pub regions: Vec<Region>,
     /// Boundary conditions at the four sides of the domain.
     #[serde(default)]

@@ -1,5 +1,6 @@
 //! This module holds the bounds that every run must satisfy at every step.
 
+use crate::plan::Plan;
 use serde::Serialize;
 
 /// Upper bounds that every run must satisfy at every step.
@@ -19,8 +20,8 @@ pub struct Criteria {
     pub misplaced: f64,
     /// Relative change of a material's projected area.
     pub drift: f64,
-    /// Relative change of the volume of all particles; incompressible scenes that no particle
-    /// leaves.
+    /// Change of the volume of all particles, plus what has left, less what has entered, relative to
+    /// the first volume; incompressible scenes.
     pub volume: f64,
     /// Largest deviation of a director's length from 1, `| |n| - 1 |`.
     pub director: f64,
@@ -64,3 +65,15 @@ pub const CRITERIA: Criteria = Criteria {
     extrema: 0.05,
     margin: 2.0,
 };
+
+/// The bounds of generalised fluids. Their iteration ends at larger errors by design, with a divergence of
+/// 1e-8.
+pub const FLOW_CURVES: Criteria = Criteria { power: 1e-2, divergence: 1e-7, ..CRITERIA };
+
+impl Criteria {
+    /// The bounds of a plan. The power of generalised fluids is as exact as the default of
+    /// `accuracy.nonlinear_tolerance`.
+    pub fn of(plan: &Plan) -> &'static Criteria {
+        if plan.effects.flow_curves { &FLOW_CURVES } else { &CRITERIA }
+    }
+}

@@ -7,7 +7,8 @@ use crate::space::mesh::Mesh;
 /// Largest relative difference of the powers in a valid solution; at the usual tolerance it is
 /// 1e-9.
 const POWER: f64 = 1e-3;
-/// The difference of the powers may exceed the solver tolerance by this factor, if that is larger.
+/// The difference of the powers may exceed the solver tolerance by this factor, if that is larger. For
+/// generalised fluids it may reach the tolerance of their iteration.
 const POWER_TOLERANCE: f64 = 10.0;
 /// Largest relative drift of the projected area of a material in a valid state; coarse meshes reach
 /// 0.05 (`grainscope stress`).
@@ -128,7 +129,11 @@ impl<const D: usize> Simulation<D> {
                 return Err(Fault::NonFinite { field, value, place: Place::Scene });
             }
         }
-        let limit = POWER.max(POWER_TOLERANCE * self.plan.method.tolerance);
+        let method = &self.plan.method;
+        let mut limit = POWER.max(POWER_TOLERANCE * method.tolerance);
+        if self.plan.effects.flow_curves {
+            limit = limit.max(method.nonlinear_tolerance);
+        }
         if r.power_error > limit {
             return Err(Fault::Power { error: r.power_error, limit });
         }

@@ -115,8 +115,7 @@ impl<const D: usize> Simulation<D> {
     /// Potential energy of the particles relative to the background material, in the plan's units.
     pub(super) fn potential_energy(&self) -> f64 {
         let p = &self.particles;
-        let ground =
-            self.plan.background().map_or(0.0, |b| self.matter.materials[b as usize].density);
+        let ground = self.background_density();
         let g = self.matter.gravity;
         let [energy] = threads::sum(0..p.len(), |k| {
             let m = &self.matter.materials[p.material[k] as usize];
@@ -127,7 +126,8 @@ impl<const D: usize> Simulation<D> {
         energy
     }
 
-    /// Power of all loads except gravity, in the plan's units.
+    /// Power of all loads except gravity, and of the pressure of the background where it crosses the
+    /// sides, in the plan's units.
     fn other_power(&self) -> f64 {
         let weight: f64 = if self.plan.effects.gravity {
             self.load
@@ -139,7 +139,7 @@ impl<const D: usize> Simulation<D> {
         } else {
             0.0
         };
-        self.report.power_in - weight
+        self.report.power_in - weight + self.power_of_background()
     }
 
     /// Forces of the materials on what the gauges of forces name, from the residual of the flow.
@@ -216,15 +216,18 @@ impl<const D: usize> Simulation<D> {
         if first {
             self.first_energy = energy;
         }
-        let lost = self.first_energy - energy + work;
+        let energy_out = self.count.energy_out * u.energy();
+        let spent = self.first_energy - energy + work;
+        let lost = spent - energy_out;
         // A smaller difference is rounding: the scene is at rest.
         let mut scale = dissipated.max(REST * self.first_energy.abs());
         if plan.effects.inertia {
-            scale = scale.max(lost.abs()).max(kinetic_energy);
+            scale = scale.max(spent.abs()).max(energy_out.abs()).max(kinetic_energy);
         }
         let tells = plan.energy_tells() && scale > 0.0;
         let energy_error = if tells { (lost - dissipated) / scale } else { 0.0 };
-        if tells && !first {
+        // What crosses the sides does so particle by particle, which does not tell the error of a step.
+        if tells && !first && !plan.exchanges_volume() {
             let of_step = [
                 before.potential_energy + before.kinetic_energy - energy + work - before.work,
                 dissipated - before.dissipated,

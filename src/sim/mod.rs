@@ -16,6 +16,7 @@ pub mod clock;
 pub mod criteria;
 mod error;
 mod examine;
+mod exchange;
 mod fault;
 pub mod guard;
 pub mod inertia;

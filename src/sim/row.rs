@@ -381,8 +381,8 @@ columns! {
         symbol: "E_k", unit: "J/m", label: "kinetic energy", rank: Rank::Compared(7),
         exists: |p| p.effects.inertia,
     };
-    /// Time integral of the power of all loads except gravity, plus the change of potential energy
-    /// by scheduled changes.
+    /// Time integral of the power of all loads except gravity (of the pressure of the background too,
+    /// where it crosses a side), plus the change of potential energy by scheduled changes.
     work: f64 = |m| m.work, 0.0, {
         symbol: "W", unit: "J/m", label: "work", rank: Rank::Compared(12),
     };
@@ -390,9 +390,10 @@ columns! {
     dissipated: f64 = |m| m.dissipated, 0.0, {
         unit: "J/m", label: "dissipated energy", rank: Rank::Compared(6),
     };
-    /// Potential and kinetic energy lost since the start plus work minus dissipated energy, over the dissipated
-    /// energy; with inertia, over the largest of the dissipated, the lost and the kinetic energy. 0 at
-    /// rest, and where the energy of the particles does not determine the balance.
+    /// Potential and kinetic energy lost since the start, less what was carried out, plus work minus
+    /// dissipated energy, over the dissipated energy; with inertia, over the largest of the dissipated,
+    /// the lost, the carried and the kinetic energy. 0 at rest, and where the energy of the particles
+    /// does not determine the balance.
     energy_error: f64 = |m| m.energy_error, 0.0, {
         label: "energy error", format: Format::Exponent, path: "diagnostics/energy_error",
         panel: Some(Panel::Balances), live: true,
@@ -418,6 +419,11 @@ columns! {
     /// Volume that has left through sides since the start.
     volume_out: f64 = |m| m.count.volume_out * m.units.volume(), 0.0, {
         unit: "m²", label: "volume out", exists: Plan::exchanges_volume,
+    };
+    /// Potential energy (relative to the background) and kinetic energy that material has carried out
+    /// of the domain since the start, less what it has brought in.
+    energy_out: f64 = |m| m.count.energy_out * m.units.energy(), 0.0, {
+        unit: "J/m", label: "energy out", exists: Plan::exchanges_volume,
     };
     /// Number of iterations for friction, yield stresses and power laws, in the solution at the end of
     /// the step.

@@ -206,7 +206,7 @@ impl<const D: usize> Simulation<D> {
         let c = self.count;
         s.put_counts("count", [c.splits, c.merges, c.held, c.left, c.healed]);
         if self.plan.exchanges_volume() {
-            s.put_floats("count.volumes", [c.volume_in, c.volume_out]);
+            s.put_floats("count.exchanged", [c.volume_in, c.volume_out, c.energy_out]);
         }
         s.put_counts("progress", [self.step, u64::from(self.version), self.next_change as u64]);
         if !self.standing.is_empty() {
@@ -287,9 +287,9 @@ impl<const D: usize> Simulation<D> {
         let refilled = s.exactly("gauges.refilled", self.gauges.len())?;
         let dye = self.dye.as_ref().map(|_| dye_lines(s)).transpose()?;
         let [splits, merges, held, left, healed] = s.tally("count")?;
-        let [volume_in, volume_out] = match s.try_floats("count.volumes") {
-            Some(_) => s.numbers("count.volumes")?,
-            None => [0.0; 2],
+        let [volume_in, volume_out, energy_out] = match s.try_floats("count.exchanged") {
+            Some(_) => s.numbers("count.exchanged")?,
+            None => [0.0; 3],
         };
         let [step, version, next_change] = s.tally("progress")?;
         let changes = plan.changes.get(..next_change as usize).ok_or(StateError::Range {
@@ -332,7 +332,8 @@ impl<const D: usize> Simulation<D> {
         if let (Some(dye), Some(lines)) = (&mut self.dye, dye) {
             dye.lines = lines;
         }
-        self.count = Count { splits, merges, held, left, healed, volume_in, volume_out };
+        self.count =
+            Count { splits, merges, held, left, healed, volume_in, volume_out, energy_out };
         (self.step, self.version, self.next_change) = (step, version, next_change as usize);
         self.time = time;
         self.switch_sources();

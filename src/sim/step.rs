@@ -110,12 +110,16 @@ impl<const D: usize> Simulation<D> {
                 &plan.effects,
                 compliant,
                 &mut self.gauges,
-                &mut self.count,
+                (&mut self.count, &mut self.crossings),
             );
             if let Some(inflow) = &self.inflow {
-                let flow = (&*self.half, part);
-                self.count.volume_in +=
-                    inflow.enter(&plan, flow, &mut self.particles, &mut self.gauges);
+                inflow.enter(
+                    &plan,
+                    (&*self.half, part),
+                    &mut self.particles,
+                    &mut self.gauges,
+                    &mut self.crossings,
+                );
             }
             if let Some(dye) = &mut self.dye {
                 let phase = Instant::now();
@@ -124,6 +128,7 @@ impl<const D: usize> Simulation<D> {
             }
             frozen_flow.start += part;
         }
+        self.count_crossings();
         seconds.motion += phase.elapsed().as_secs_f64() - seconds.dye;
         let phase = Instant::now();
         let end = if limiter == Limiter::Stop { self.next_stop() } else { self.time + dt };
@@ -223,6 +228,7 @@ impl<const D: usize> Simulation<D> {
             FrozenFlow::new(&plan.mesh, &plan.enclosure, velocities, half, &kinks, part)
         };
         let (effects, no_gauges, mut ignored) = (&plan.effects, &mut [], Count::default());
+        let mut crossings = Vec::new();
         for _ in 0..parts {
             advect::advance(
                 &frozen_flow,
@@ -231,10 +237,10 @@ impl<const D: usize> Simulation<D> {
                 effects,
                 compliant,
                 no_gauges,
-                &mut ignored,
+                (&mut ignored, &mut crossings),
             );
             if let Some(inflow) = inflow {
-                inflow.enter(&plan, (half, part), &mut there, no_gauges);
+                inflow.enter(&plan, (half, part), &mut there, no_gauges, &mut crossings);
             }
             frozen_flow.start += part;
         }

@@ -322,7 +322,9 @@ impl Particles {
         let (fa, fb) = (va / (va + vb), vb / (va + vb));
         self.volume[a] = va + vb;
         for c in 0..2 {
-            self.position[a][c] = fa * self.position[a][c] + fb * self.position[b][c];
+            let (x, y) = (self.position[a][c], self.position[b][c]);
+            // By rounding, the mean of two points on a side of the domain may lie beyond it.
+            self.position[a][c] = (fa * x + fb * y).clamp(x.min(y), x.max(y));
         }
         if let Some(d) = &mut self.director {
             let [p, q] = [d[a], d[b]];

@@ -4,6 +4,7 @@
 //! which its result must agree. Every trial must satisfy the same fixed [`CRITERIA`] at every step;
 //! its verdict says by how much it does.
 
+mod grains;
 mod page;
 mod round;
 mod run;

@@ -1,7 +1,7 @@
 //! Formats the outcomes of the stress battery as a table, a documentation page and JSON.
 
 use super::{Outcome, Verdict};
-use crate::sim::criteria::CRITERIA;
+use crate::sim::criteria::{CRITERIA, FLOW_CURVES};
 use crate::verify::{Table, number};
 use serde::Serialize;
 
@@ -34,7 +34,7 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
         ("corrections", c.corrections, "solver corrections in a step, summed over its solutions"),
         ("volume of cells", c.misplaced, "volume in wrong cells, over that of a row of particles"),
         ("drift of projected area", c.drift, "relative change of a material's area on the mesh"),
-        ("volume of particles", c.volume, "relative change, if no particle leaves"),
+        ("volume of particles", c.volume, "relative change, without what enters and leaves"),
         ("length of directors", c.director, "deviation from 1"),
         ("particles outside", c.outside, "number outside the domain or inside a solid"),
         (
@@ -55,10 +55,14 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
          its bound; `margin x` is the factor of the value closest to its bound. Lower bounds \
          (rates of convergence) have no margin. The scene of a failed trial and the reason are \
          written to `stress-failures/`. The drift is not checked for materials smaller than a cell \
-         and for those that change their volume or leave the domain. `cargo test` runs the quick \
+         and for those that change their volume or leave the domain. Fluids with flow curves (friction, yield \
+         stress) have a power balance of at most {} and a divergence of at most {}, because their iteration \
+         ends there by design. `cargo test` runs the quick \
          part.\n\n{} trials: {} pass, {} have a margin below {}, {} fail.\n\n{}",
         criteria.markdown(),
         number(c.margin),
+        number(FLOW_CURVES.power),
+        number(FLOW_CURVES.divergence),
         outcomes.len(),
         count(|v| *v == Verdict::Pass),
         count(|v| matches!(v, Verdict::Margin(_))),

@@ -3,7 +3,7 @@
 use super::{Outcome, Trial, Verdict, judge};
 use crate::cases::{CaseError, plan_of};
 use crate::session::march;
-use crate::sim::criteria::{CRITERIA, ENERGY_STEPS};
+use crate::sim::criteria::{Criteria, ENERGY_STEPS};
 use crate::sim::{self, Run};
 use crate::space::mesh::Axis;
 use crate::threads;
@@ -79,10 +79,9 @@ impl Worst {
         raise(&mut self.growth, row.max_speed / first.speed);
         if !plan.effects.volume_change {
             raise(&mut self.misplaced, misplaced_volume(run));
-            if run.count().left == 0 {
-                let volume: f64 = particles.volume.iter().sum();
-                raise(&mut self.volume, (volume / first.volume - 1.0).abs());
-            }
+            let volume: f64 = particles.volume.iter().sum();
+            let kept = volume + run.count().volume_out - run.count().volume_in;
+            raise(&mut self.volume, (kept - first.volume).abs() / first.volume);
         }
         raise(&mut self.outside, misplaced(run) as f64);
         if plan.effects.volume_change {
@@ -98,8 +97,7 @@ impl Worst {
     }
 
     /// Checks of all values; without that of the drift if `drifts`.
-    fn checks(&self, drifts: bool) -> Vec<Check> {
-        let c = &CRITERIA;
+    fn checks(&self, drifts: bool, c: &Criteria) -> Vec<Check> {
         let mut out = vec![
             ("power balance", self.power, c.power),
             ("divergence", self.divergence, c.divergence),
@@ -180,7 +178,7 @@ impl Trial {
         if !self.drifts && row.step >= ENERGY_STEPS {
             raise(&mut worst.energy, row.energy_error.abs());
         }
-        let mut checks = worst.checks(self.drifts);
+        let mut checks = worst.checks(self.drifts, Criteria::of(run.plan()));
         if let Some(expect) = &self.expect {
             checks.extend(expect(run.as_ref())?);
         }

@@ -23,6 +23,7 @@ pub fn all() -> Result<Vec<Trial>, CaseError> {
     particles(&mut out)?;
     units(&mut out);
     super::round::trials(&mut out)?;
+    super::grains::trials(&mut out);
     Ok(out
         .into_iter()
         .map(|t| {

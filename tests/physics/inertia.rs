@@ -97,3 +97,65 @@ fn a_flow_without_inertia_has_no_momentum() {
     let [a, b] = [speed(&*slow), speed(&*creeping)];
     assert!(b < 0.0 && (a / b - 1.0).abs() < 1e-2, "{a} {b}");
 }
+
+/// Water that is pushed through a box above a lighter fluid.
+const PUSHED: &str = r#"schema = 1
+name = "pushed"
+inertia = true
+gravity = [0, -1]
+[domain]
+x = [0, 1]
+y = [0, 2]
+[accuracy]
+cells = 8
+[time]
+end = 1
+[materials.water]
+density = 1
+shear_viscosity = 0.01
+[materials.light]
+density = 0.1
+shear_viscosity = 0.01
+background = true
+[[regions]]
+material = "water"
+shape.where = "y > 1"
+[boundaries]
+top = { velocity_x = 0, velocity_y = -1, inflow = "water" }
+"#;
+
+#[test]
+fn the_energy_that_crosses_the_sides_is_counted() {
+    // A plug of both fluids: no dissipation, and every energy is known.
+    let mut run = scene(&format!("{PUSHED}bottom.kind = \"open\"\n"), &["time.end=0.75"]);
+    finish(run.as_mut(), |_| ());
+    let row = run.row();
+    let t = row.time;
+    // Water enters at y = 2 and light fluid leaves at y = 0, both at unit speed; densities of potential
+    // energy are relative to the light fluid.
+    let out = 0.5 * 0.1 * t - t * (0.9 * 2.0 + 0.5);
+    assert!((row.energy_out - out).abs() < 0.02 * out.abs(), "{} {out}", row.energy_out);
+    assert!((row.kinetic_energy - 0.5 * (1.1 + 0.9 * t)).abs() < 1e-2, "{}", row.kinetic_energy);
+    assert!(row.dissipated < 1e-12 && row.energy_error.abs() < 2e-3, "{}", row.energy_error);
+}
+
+#[test]
+fn a_flow_that_a_side_sets_in_motion_starts_smoothly() {
+    let slit = "[boundaries.bottom]\nkind = \"no_slip\"\n[[boundaries.bottom.parts]]\nfrom = 0.25\n\
+                to = 0.75\nkind = \"outflow\"\n";
+    for cells in ["8", "16"] {
+        let mut run = scene(&format!("{PUSHED}{slit}"), &[&format!("accuracy.cells={cells}")]);
+        // The flow of the impulse is fast at the lips of the slit, and the fluid there is slow at once.
+        let first = run.row().max_speed;
+        finish(run.as_mut(), |run| {
+            let row = run.row();
+            assert!(
+                row.step == 0 || row.max_speed < 0.5 * first,
+                "{}: {}",
+                row.step,
+                row.max_speed
+            );
+        });
+        assert!(run.row().energy_error.abs() < 0.02, "{cells}: {}", run.row().energy_error);
+    }
+}

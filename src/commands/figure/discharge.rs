@@ -13,9 +13,9 @@ use std::path::Path;
 /// Width of the vessel of both presets, and level of its filling at the start, m.
 const VESSEL: f64 = 5.0;
 const FILLED: f64 = 4.5;
-/// Apertures of the figure of Beverloo's law, m.
+/// Apertures of the figures of Beverloo's law, m.
 const APERTURES: [&str; 5] = ["0.5", "0.7", "0.9", "1.1", "1.3"];
-/// Diameter of the grains of the preset, m.
+/// Diameter of the grains of the presets, m.
 const DIAMETER: f64 = 1.0 / 30.0;
 /// Time between which the rate of discharge is averaged, s: after the start, while the level is high.
 const STEADY: [f64; 2] = [1.5, 3.5];
@@ -114,18 +114,54 @@ pub(super) fn hourglass(args: &Args, out: &Path) -> Result<String, Failure> {
     Ok(said + &super::files(&stem) + &runs::list(&jobs))
 }
 
-/// Discharge rate `Q` of the preset `hourglass` against the aperture `W`, with the fitted line
+/// An hour-glass whose discharge rate is measured against its aperture.
+pub(super) struct Aperture {
+    /// Preset.
+    preset: &'static str,
+    /// Name and symbol of the size of the aperture.
+    size: [&'static str; 2],
+    /// Exponent of the size in Beverloo's law, and the text of its inverse.
+    exponent: f64,
+    inverse: &'static str,
+    /// Unit of the rate.
+    unit: &'static str,
+    /// Name of the picture.
+    picture: &'static str,
+}
+
+/// A slit.
+pub(super) const SLIT: Aperture = Aperture {
+    preset: "hourglass",
+    size: ["aperture", "W"],
+    exponent: 1.5,
+    inverse: "2/3",
+    unit: "m²/s",
+    picture: "beverloo_rates",
+};
+/// A round hole.
+pub(super) const HOLE: Aperture = Aperture {
+    preset: "round_hourglass",
+    size: ["diameter", "D"],
+    exponent: 2.5,
+    inverse: "2/5",
+    unit: "m³/s",
+    picture: "round_beverloo_rates",
+};
+
+/// Discharge rate `Q` of an hour-glass against the size `W` of its aperture, with the fitted line
 ///
 /// ```text
-/// Q^(2/3) = s (W - W0)
+/// Q^(1/n) = s (W - W0)        n = 3/2 for a slit, 5/2 for a round hole
 /// ```
-pub(super) fn beverloo(args: &Args, out: &Path) -> Result<String, Failure> {
-    let source = presets::find("hourglass")?;
+/// (W. A. Beverloo, H. A. Leniger, J. van de Velde, Chem. Eng. Sci. 15 (1961) 260).
+pub(super) fn beverloo(of: &Aperture, args: &Args, out: &Path) -> Result<String, Failure> {
+    let source = presets::find(of.preset)?;
     let mut jobs = vec![];
+    let [size, letter] = of.size;
     for aperture in APERTURES {
         let more = [format!("aperture={aperture}"), format!("time.end={}", STEADY[1] + 0.1)];
         let folder = format!("aperture_{aperture}");
-        let run = (format!("W = {aperture}"), folder, sets(args, &more));
+        let run = (format!("{letter} = {aperture}"), folder, sets(args, &more));
         jobs.push(Job::new(&source, run, (args, out))?);
     }
     let found = runs::run_all(&jobs, Discharge::gather)?;
@@ -133,26 +169,28 @@ pub(super) fn beverloo(args: &Args, out: &Path) -> Result<String, Failure> {
         Some((w.parse::<f64>().ok()?, d.mean_rate(STEADY, |s| s[0]).filter(|&q| q > 0.0)?))
     });
     let rates: Vec<(f64, f64)> = rates.collect();
-    let measured: Vec<(f64, f64)> = rates.iter().map(|&(w, q)| (w, q.powf(2.0 / 3.0))).collect();
+    let measured: Vec<(f64, f64)> =
+        rates.iter().map(|&(w, q)| (w, q.powf(1.0 / of.exponent))).collect();
     let [slope, offset] = line(&measured);
     let least = -offset / slope;
     let logarithms: Vec<_> = rates.iter().map(|&(w, q)| (w.ln(), q.ln())).collect();
     let exponent = line(&logarithms)[0];
+    let Aperture { inverse, unit, .. } = of;
     let fit = format!(
-        "Q^(2/3) = {} (W - W0), W0 = {} m, plain exponent {}",
+        "Q^({inverse}) = {} ({letter} - {letter}0), {letter}0 = {} m, plain exponent {}",
         short(slope),
         short(least),
         short(exponent)
     );
     let end = measured.last().map_or(1.0, |p| p.0);
     let ends = [least.min(measured.first().map_or(0.0, |p| p.0)), end];
-    let stem = out.join("beverloo_rates");
+    let stem = out.join(of.picture);
     line_plot(
         &stem,
         &PlotSpec {
             title: format!("Discharge of grains: {fit}"),
-            x: Axis::new("aperture W", "m"),
-            y: Axis::new("Q^(2/3)", "(m²/s)^(2/3)"),
+            x: Axis::new(&format!("{size} {letter}"), "m"),
+            y: Axis::new(&format!("Q^({inverse})"), &format!("({unit})^({inverse})")),
             curves: vec![
                 Curve { name: "measured".into(), points: measured.clone(), marks: true },
                 Curve {
@@ -166,9 +204,11 @@ pub(super) fn beverloo(args: &Args, out: &Path) -> Result<String, Failure> {
     let mut said = String::new();
     for ((w, q), (_, y)) in rates.iter().zip(&measured) {
         let off = 100.0 * (y / (slope * w + offset) - 1.0);
-        said += &format!("W = {w} m: Q = {q:.4} m2/s, Q^(2/3) off the line by {off:+.2} %\n");
+        said += &format!(
+            "{letter} = {w} m: Q = {q:.4} {unit}, Q^({inverse}) off the line by {off:+.2} %\n"
+        );
     }
-    said += &format!("{fit}; W0 is {} grain diameters\n", short(least / DIAMETER));
+    said += &format!("{fit}; {letter}0 is {} grain diameters\n", short(least / DIAMETER));
     Ok(said + &super::files(&stem) + &runs::list(&jobs))
 }
 
