@@ -73,6 +73,15 @@ pub enum Warning {
         /// Share of the flowing volume, mean over the run.
         share: f64,
     },
+    /// The weight of the background drives a flow through an opening.
+    Draft {
+        /// The opening, as its key in the scene.
+        place: String,
+        /// Name of the background.
+        material: String,
+        /// Key and value that give the pressure of the background at rest.
+        remedy: String,
+    },
     /// Regions are too small to contain a particle.
     RegionsEmpty {
         /// Indices of the regions.
@@ -153,6 +162,12 @@ impl fmt::Display for Warning {
                  the law of friction alone is ill-posed: bands and small waves there depend on the \
                  mesh; give the grains internal_length and coupling_ratio",
                 100.0 * share
+            ),
+            Warning::Draft { place, material, remedy } => write!(
+                f,
+                "`{material}` has weight, but at {place} its pressure is zero at all heights: it \
+                 falls out below and comes in above; close this opening, or give the pressure of \
+                 `{material}` at rest: {remedy}"
             ),
             Warning::RegionsEmpty { regions } => {
                 let list: Vec<String> = regions.iter().map(|k| format!("regions[{k}]")).collect();

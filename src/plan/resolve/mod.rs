@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod axis;
+mod drafts;
 mod dye;
 mod flow_curves;
 mod gauges;
@@ -140,6 +141,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
     }
     if effects.gravity {
         warnings.extend(thin_fluid(&si.materials));
+        warnings.extend(drafts::drafts(scene, &si, domain, &boundary));
     }
     let body_force = scene
         .body_force
