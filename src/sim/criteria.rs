@@ -67,8 +67,9 @@ pub const CRITERIA: Criteria = Criteria {
 };
 
 /// The bounds of generalised fluids. Their iteration ends at larger errors by design, with a divergence of
-/// 1e-8.
-pub const FLOW_CURVES: Criteria = Criteria { power: 1e-2, divergence: 1e-7, ..CRITERIA };
+/// 1e-8, and may take 100 corrections in each of the two solutions of a step.
+pub const FLOW_CURVES: Criteria =
+    Criteria { power: 1e-2, divergence: 1e-7, corrections: 200.0, ..CRITERIA };
 
 impl Criteria {
     /// The bounds of a plan. The power of generalised fluids is as exact as the default of

@@ -55,8 +55,10 @@ const FRICTION_POWER: f64 = 1e-3;
 /// The same at the smallest tolerances.
 const ROUNDING: f64 = 1e-9;
 
-/// Number of times that the laws take a new pressure in a step.
-const UPDATES: u32 = 1;
+/// Largest number of times that the laws take a new pressure in a step; from then on they keep it, so that
+/// a pressure that alternates does not prevent convergence. With one time only, grains above a round
+/// hole of 15 diameters stick and slip at a tenth of their rate.
+const UPDATES: u32 = 8;
 /// Tolerance of the flows of the softer materials from which a first flow starts.
 const ROUGH: f64 = 0.1;
 /// Factor between their largest viscosities.

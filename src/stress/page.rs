@@ -56,13 +56,14 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
          (rates of convergence) have no margin. The scene of a failed trial and the reason are \
          written to `stress-failures/`. The drift is not checked for materials smaller than a cell \
          and for those that change their volume or leave the domain. Fluids with flow curves (friction, yield \
-         stress) have a power balance of at most {} and a divergence of at most {}, because their iteration \
-         ends there by design. `cargo test` runs the quick \
+         stress) have a power balance of at most {}, a divergence of at most {} and at most {} corrections: their \
+         iteration ends there by design. `cargo test` runs the quick \
          part.\n\n{} trials: {} pass, {} have a margin below {}, {} fail.\n\n{}",
         criteria.markdown(),
         number(c.margin),
         number(FLOW_CURVES.power),
         number(FLOW_CURVES.divergence),
+        number(FLOW_CURVES.corrections),
         outcomes.len(),
         count(|v| *v == Verdict::Pass),
         count(|v| matches!(v, Verdict::Margin(_))),
