@@ -16,9 +16,7 @@
 //! particles along it.
 
 use super::interface::fade;
-use crate::space::shape::{
-    GAUSS_3, GAUSS_3_WEIGHTS, GAUSS_6, GaussPoint, SUBPOINTS, Shape, lagrange_6,
-};
+use crate::space::shape::{GAUSS_4, GAUSS_6, GaussPoint, SUBPOINTS, Shape, lagrange_6};
 
 /// Ratio of the distance of the material's centroid from the centre of the cell to that of its side
 /// of the line, below which the material does not lie on one side (drops, sheets, debris), and from
@@ -64,7 +62,8 @@ impl StraightCut {
     /// Integration points of both sides, with the index of their side: 0 for the rest, 1 for the material.
     ///
     /// The rule is exact for products of the gradients of two biquadratic velocities with a linear
-    /// thickness, and all its weights are positive: a form that is not negative at any point stays so.
+    /// thickness, and for their hoop rates to 1e-4. All its weights are positive: a form that is not
+    /// negative at any point stays so.
     pub fn points(&self) -> impl Iterator<Item = (usize, GaussPoint)> + '_ {
         let Side { width, height: [a, b] } = self.lesser;
         let other = 1 - self.lesser_side;
@@ -75,16 +74,16 @@ impl StraightCut {
             (other, [width, 2.0], [[0.0, 2.0]; 2]),
         ];
         parts.into_iter().flat_map(move |(side, x, y)| {
-            let points = if x[1] > x[0] { GAUSS_6.len() * GAUSS_3.len() } else { 0 };
+            let points = if x[1] > x[0] { GAUSS_6.len() * GAUSS_4.len() } else { 0 };
             (0..points).map(move |k| {
-                let ((s, ws), t) = (GAUSS_6[k % 6], GAUSS_3[k / 6]);
+                let ((s, ws), (t, wt)) = (GAUSS_6[k % 6], GAUSS_4[k / 6]);
                 let between = |[from, to]: [f64; 2], t: f64| from + 0.5 * (1.0 + t) * (to - from);
                 let [low, high] = [0, 1].map(|end| between([y[0][end], y[1][end]], s));
                 let area = (x[1] - x[0]) * (high - low);
                 let [x, y] = [between(x, s), between([low, high], t)];
                 let at = if self.turned { [y, x] } else { [x, y] };
                 let r = [0, 1].map(|c| self.corner[c] * (1.0 - at[c]));
-                let weight = 0.25 * ws * GAUSS_3_WEIGHTS[k / 6] * area;
+                let weight = 0.25 * ws * wt * area;
                 (side, GaussPoint { r, weight, shape: Shape::at(r) })
             })
         })

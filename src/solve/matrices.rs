@@ -156,7 +156,9 @@ impl<const D: usize> Matrices<D> {
         outlines.cells().iter().for_each(|&cell| self.built_from[cell] = Content::Unknown);
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
-            let known = content.is_constant() && content == *built_from;
+            // The penalty of a cell with a solid in it depends on its neighbours.
+            let alone = from.mesh.part(cell).is_none();
+            let known = content.is_constant() && content == *built_from && alone;
             if content != Content::Solid && !known {
                 let blocks = Self::NO_BLOCKS;
                 let matrix = CellMatrix::ZERO;
@@ -188,6 +190,18 @@ impl<const D: usize> Matrices<D> {
             }
         }
     }
+}
+
+/// Viscosity that resists the divergence of a cell. The unknowns of a cell with a solid in it are those
+/// of its neighbours, of which the most viscous counts: with the cell's own viscosity, thin fluid beside
+/// a solid and a heavy fluid takes too many corrections.
+fn stiffness(mesh: &Mesh, quadrature: &Quadrature, cell: usize) -> f64 {
+    let own = quadrature.mean_viscosity[cell];
+    if mesh.part(cell).is_none() {
+        return own;
+    }
+    let near = mesh.block(cell).filter(|&c| !mesh.solid[c]);
+    near.map(|c| quadrature.mean_viscosity[c]).fold(own, f64::max)
 }
 
 impl<const D: usize> Fresh<D> {
@@ -239,7 +253,7 @@ impl<const D: usize> Fresh<D> {
         }
         quadrature.slip_outlines().add_stiffness(cell, &mut k);
         let mass = measure.pressure_mass();
-        let viscosity = quadrature.mean_viscosity[cell]
+        let viscosity = stiffness(mesh, quadrature, cell)
             + if D == 3 { turning } else { 0.0 }
             + terms.inertia.resistance(cell, measure.volume(), size[0].max(size[1]));
         let penalty = if quadrature.flows(cell) { FLOWING_PENALTY } else { PENALTY };

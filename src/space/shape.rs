@@ -93,6 +93,13 @@ pub static GAUSS_3X3: LazyLock<[GaussPoint; 9]> = LazyLock::new(|| {
 /// Number of points of [`GAUSS_6X6`].
 pub const SUBPOINTS: usize = 36;
 
+/// Four-point Gauss rule `(abscissa, weight)` on `[-1, 1]` with weights that add up to 1, ascending.
+pub const GAUSS_4: [(f64, f64); 4] = {
+    const A: [f64; 2] = [0.339_981_043_584_856_3, 0.861_136_311_594_052_6];
+    const W: [f64; 2] = [0.326_072_577_431_273_1, 0.173_927_422_568_726_9];
+    [(-A[1], W[1]), (-A[0], W[0]), (A[0], W[0]), (A[1], W[1])]
+};
+
 /// Six-point Gauss rule `(abscissa, weight)` on `[-1, 1]` with weights that add up to 1, ascending.
 pub const GAUSS_6: [(f64, f64); 6] = {
     const A: [f64; 3] = [0.238_619_186_083_196_9, 0.661_209_386_466_264_5, 0.932_469_514_203_152];

@@ -8,6 +8,7 @@ mod grains;
 mod page;
 mod round;
 mod run;
+mod solids;
 mod trials;
 
 pub use page::{json, markdown, table};

@@ -134,9 +134,8 @@ fn misplaced_volume(run: &dyn Run) -> f64 {
 fn misplaced(run: &dyn Run) -> usize {
     let mesh = &run.plan().mesh;
     let inside = |v: f64, axis: &Axis| v >= axis.start() && v <= axis.end();
-    let held = |&&p: &&[f64; 2]| {
-        inside(p[0], &mesh.x) && inside(p[1], &mesh.y) && !mesh.solid[mesh.locate(p)]
-    };
+    let held =
+        |&&p: &&[f64; 2]| inside(p[0], &mesh.x) && inside(p[1], &mesh.y) && !mesh.is_solid_at(p);
     let particles = run.particles();
     particles.len() - particles.position.iter().filter(held).count()
 }

@@ -24,6 +24,7 @@ pub fn all() -> Result<Vec<Trial>, CaseError> {
     units(&mut out);
     super::round::trials(&mut out)?;
     super::grains::trials(&mut out);
+    super::solids::trials(&mut out);
     Ok(out
         .into_iter()
         .map(|t| {

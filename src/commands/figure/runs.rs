@@ -125,7 +125,8 @@ fn make<T: Default>(
         counted = counted.max(part);
     })?;
     let outflow = summary.gauges.values().next();
-    let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} m2", g.volume));
+    let unit = job.plan.scene.domain.geometry.unit("m²");
+    let outflow = outflow.map_or(String::new(), |g| format!(", outflow {:.3} {unit}", g.volume));
     let took = duration(summary.seconds.get("total").copied().unwrap_or_default());
     bar.suspend(|| eprintln!("{}: {} in {took}{outflow}", job.name, count(summary.steps, "step")));
     Ok(gathered)

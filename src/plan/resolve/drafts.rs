@@ -30,11 +30,8 @@ pub(super) fn drafts(
         let along = 1 - side / 2;
         let (gravity, axis) = (si.gravity[along], ["x", "y"][along]);
         let [low, high] = domain[along];
-        let depth = if gravity < 0.0 {
-            format!("({high} - {axis})")
-        } else {
-            format!("({axis} - {low})")
-        };
+        let depth =
+            if gravity < 0.0 { format!("({high} - {axis})") } else { format!("({axis} - {low})") };
         let sign = if side.is_multiple_of(2) { "" } else { "-" };
         let key = ["traction_x", "traction_y"][side / 2];
         Warning::Draft {
