@@ -8,8 +8,10 @@ use crate::space::mesh::Mesh;
 /// 1e-9.
 const POWER: f64 = 1e-3;
 /// The difference of the powers may exceed the solver tolerance by this factor, if that is larger. For
-/// generalised fluids it may reach the tolerance of their iteration.
+/// generalised fluids the tolerance of their iteration counts.
 const POWER_TOLERANCE: f64 = 10.0;
+/// The same factor for that tolerance: errors up to it are by design.
+const NONLINEAR_TOLERANCE: f64 = 2.0;
 /// Largest relative drift of the projected area of a material in a valid state; coarse meshes reach
 /// 0.05 (`grainscope stress`).
 const DRIFT: f64 = 0.2;
@@ -132,7 +134,7 @@ impl<const D: usize> Simulation<D> {
         let method = &self.plan.method;
         let mut limit = POWER.max(POWER_TOLERANCE * method.tolerance);
         if self.plan.effects.flow_curves {
-            limit = limit.max(method.nonlinear_tolerance);
+            limit = limit.max(NONLINEAR_TOLERANCE * method.nonlinear_tolerance);
         }
         if r.power_error > limit {
             return Err(Fault::Power { error: r.power_error, limit });

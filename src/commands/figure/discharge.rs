@@ -189,8 +189,8 @@ pub(super) fn beverloo(of: &Aperture, args: &Args, out: &Path) -> Result<String,
         &stem,
         &PlotSpec {
             title: format!("Discharge of grains: {fit}"),
-            x: Axis::new(&format!("{size} {letter}"), "m"),
-            y: Axis::new(&format!("Q^({inverse})"), &format!("({unit})^({inverse})")),
+            x: Axis::new(format!("{size} {letter}"), "m"),
+            y: Axis::new(format!("Q^({inverse})"), format!("({unit})^({inverse})")),
             curves: vec![
                 Curve { name: "measured".into(), points: measured.clone(), marks: true },
                 Curve {
