@@ -18,7 +18,7 @@ use crate::plan::{Entering, InitialFields, Plan};
 use crate::space::count::Crossing;
 use crate::space::mesh::{INSIDE, Mesh};
 use crate::space::particles::Particles;
-use crate::space::shape::{SIDE_NODES, Shape, side_normal};
+use crate::space::shape::{SIDE_NODES, Shape, side_end, side_normal, side_point};
 
 /// Pieces of a part of a face that a solid may cover.
 const PIECES: usize = 16;
@@ -69,10 +69,7 @@ impl Inflow {
             out.add_faces(mesh, entering, cells.map(|cell| (cell, side)));
         }
         for source in &plan.boundary.sources {
-            let forwards = source.velocity > 0.0;
-            let side = 2 * source.segment.normal + usize::from(!forwards);
-            let cells = source.segment.cells_beside(mesh, forwards);
-            out.add_faces(mesh, &source.entering, cells.map(|cell| (cell, side)));
+            out.add_faces(mesh, &source.entering, source.faces(mesh));
         }
         (!out.faces.is_empty()).then_some(out)
     }
@@ -142,7 +139,7 @@ impl Inflow {
     ) {
         let mesh = &*plan.mesh;
         let normal = side_normal(side);
-        let outwards = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
+        let outwards = side_end(side);
         let nodes = mesh.cell_nodes(home);
         let nodal = SIDE_NODES[side].map(|a| velocity[nodes[a]]);
         let area = mesh.face(home, side);
@@ -154,10 +151,7 @@ impl Inflow {
         let low = -1.0 + k as f64 * width;
         let [middle, high] = [low + 0.5 * width, low + width];
         // Nothing enters through what a solid covers.
-        let free = |t: f64| {
-            let r = if normal == 0 { [outwards, t] } else { [t, outwards] };
-            !mesh.is_solid_in(home, mesh.from_reference(home, r))
-        };
+        let free = |t: f64| !mesh.is_solid_in(home, mesh.from_reference(home, side_point(side, t)));
         let mean = |c: usize| {
             if mesh.part(home).is_none() {
                 // Simpson's rule is exact for quadratic functions.

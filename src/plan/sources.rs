@@ -3,6 +3,7 @@
 use super::Plan;
 use crate::scene::FieldFn;
 use crate::space::constraints::Constraints;
+use crate::space::mesh::Mesh;
 use crate::space::segment::Segment;
 
 /// Times that differ by less than this share of the run are one, as in the plan's stops.
@@ -34,6 +35,13 @@ pub struct Source {
 }
 
 impl Source {
+    /// The cells at its mouth, with the side of each that is on it (left, right, lower, upper).
+    pub fn faces<'a>(&self, mesh: &'a Mesh) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        let forwards = self.velocity > 0.0;
+        let side = 2 * self.segment.normal + usize::from(!forwards);
+        self.segment.cells_beside(mesh, forwards).map(move |cell| (cell, side))
+    }
+
     /// Whether material enters after the time `now`; times that differ by less than `tiny` are one.
     pub fn is_on(&self, now: f64, tiny: f64) -> bool {
         let [from, to] = self.times;

@@ -2,7 +2,6 @@
 
 use super::fault::{Fault, Place};
 use super::simulation::Simulation;
-use crate::space::mesh::Mesh;
 
 /// Largest relative difference of the powers in a valid solution; at the usual tolerance it is
 /// 1e-9.
@@ -32,12 +31,6 @@ fn first_bad(values: &[f64]) -> Option<(usize, f64)> {
     let first = part * TOGETHER;
     let bad = values[first..].iter().position(|&v| !good(v))?;
     Some((first + bad, values[first + bad]))
-}
-
-/// Whether a point is in the domain.
-fn inside(mesh: &Mesh, p: [f64; 2]) -> bool {
-    let within = |v: f64, axis: &crate::space::mesh::Axis| v >= axis.start() && v <= axis.end();
-    within(p[0], &mesh.x) && within(p[1], &mesh.y) && !mesh.is_solid_at(p)
 }
 
 impl<const D: usize> Simulation<D> {
@@ -105,7 +98,7 @@ impl<const D: usize> Simulation<D> {
         {
             return Err(Fault::NotPositive { field: "the viscosity", value, place: place(k) });
         }
-        match p.position.iter().position(|&at| !inside(mesh, at)) {
+        match p.position.iter().position(|&at| !mesh.holds(at)) {
             Some(k) => Err(Fault::Outside { place: place(k) }),
             None => Ok(()),
         }

@@ -1,7 +1,7 @@
 //! This module computes what the material that enters and leaves carries: volume and energy.
 //!
-//! The energy of the particles is relative to the background, of density `rho_0`. Particles that leave take
-//! `V ((rho - rho_0) (-g.x) + rho u^2/2)` with them, with the velocity where they cross. The background
+//! The energy of the particles is relative to the background, of density `rho_0`. Particles that leave
+//! take `V ((rho - rho_0) (-g.x) + rho u^2/2)` with them, with the velocity where they cross. The background
 //! itself, whose weight its pressure balances, does the work
 //!
 //! ```text
@@ -12,7 +12,9 @@
 use super::inertia::interpolated;
 use super::simulation::Simulation;
 use crate::space::count::Crossing;
-use crate::space::shape::{GAUSS_3, GAUSS_3_WEIGHTS, SIDE_NODES, Shape, side_normal};
+use crate::space::shape::{
+    GAUSS_3, GAUSS_3_WEIGHTS, SIDE_NODES, Shape, side_end, side_normal, side_point,
+};
 
 impl<const D: usize> Simulation<D> {
     /// Density of the background, in the plan's units; zero without one.
@@ -62,25 +64,19 @@ impl<const D: usize> Simulation<D> {
         let sides = plan.boundary.pieces().flat_map(|(side, piece)| {
             piece.segment.cells_at_side(mesh, side).map(move |(_, cell)| (cell, side))
         });
-        let mouths = plan.boundary.sources.iter().flat_map(|source| {
-            let forwards = source.velocity > 0.0;
-            let side = 2 * source.segment.normal + usize::from(!forwards);
-            source.segment.cells_beside(mesh, forwards).map(move |cell| (cell, side))
-        });
+        let mouths = plan.boundary.sources.iter().flat_map(|source| source.faces(mesh));
         let mut sum = 0.0;
         for (cell, side) in sides.chain(mouths).filter(|&(cell, _)| !mesh.solid[cell]) {
             let normal = side_normal(side);
-            let outwards = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
             let (nodes, face) = (mesh.cell_nodes(cell), mesh.face(cell, side));
             for (t, weight) in GAUSS_3.into_iter().zip(GAUSS_3_WEIGHTS) {
-                let r = if normal == 0 { [outwards, t] } else { [t, outwards] };
-                let x = mesh.from_reference(cell, r);
+                let x = mesh.from_reference(cell, side_point(side, t));
                 if mesh.is_solid_in(cell, x) {
                     continue;
                 }
                 let along = Shape::line(t).into_iter().zip(SIDE_NODES[side]);
                 let u: f64 = along.map(|(n, a)| n * self.flow.velocity[nodes[a]][normal]).sum();
-                sum += face.of_point(weight, t) * (g[0] * x[0] + g[1] * x[1]) * outwards * u;
+                sum += face.of_point(weight, t) * (g[0] * x[0] + g[1] * x[1]) * side_end(side) * u;
             }
         }
         density * sum

@@ -20,7 +20,7 @@ use crate::plan::Plan;
 use crate::solve::density::Density;
 use crate::solve::terms::inertia::{Inertia as Term, Mass};
 use crate::space::flow::{Flow, interpolate};
-use crate::space::mesh::{Axis, Mesh};
+use crate::space::mesh::Mesh;
 use crate::space::shape::{NODES, SUBPOINTS, Shape};
 use crate::threads;
 
@@ -195,10 +195,7 @@ fn trace(flow: &FrozenFlow, parts: u32, mut point: (usize, [f64; 2])) -> (usize,
 /// The cell and the position at the end of a path. A path that leaves the domain ends at its side.
 fn end(mesh: &Mesh, way: &Displacement) -> (usize, [f64; 2]) {
     if way.left {
-        let inside = |c: usize, axis: &Axis| {
-            if axis.periodic() { way.to[c] } else { way.to[c].clamp(axis.start(), axis.end()) }
-        };
-        let at = mesh.wrap([inside(0, &mesh.x), inside(1, &mesh.y)]);
+        let at = mesh.wrap(mesh.nearest_inside(way.to));
         return (mesh.locate(at), at);
     }
     let at = mesh.wrap(way.to);

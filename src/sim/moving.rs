@@ -22,6 +22,7 @@ use crate::space::neighbours::{Neighbours, open_faces};
 use crate::space::outline::{Obstacle, push_out};
 use crate::space::particles::Particles;
 use crate::space::population::Population;
+use crate::space::shape::side_point;
 use std::sync::Arc;
 
 /// Largest displacement of a solid in a step, in cells.
@@ -197,7 +198,7 @@ impl<const D: usize> Simulation<D> {
         let Some(parts) = mesh.parts() else { return };
         for p in self.dye.iter_mut().flat_map(|dye| dye.lines.iter_mut().flatten()) {
             if parts.is_solid(*p) {
-                *p = inside_domain(&mesh, push_out(parts.obstacles([0.0; 2]), *p));
+                *p = mesh.nearest_inside(mesh.wrap(push_out(parts.obstacles([0.0; 2]), *p)));
             }
         }
     }
@@ -212,16 +213,11 @@ pub(super) fn clear(mesh: &Mesh, particles: &mut Particles) {
             if parts.is_solid(place) {
                 let free =
                     push_out(parts.solids.iter().map(|s| Obstacle::at_rest(&s.outline)), place);
-                particles.position[p] = inside_domain(mesh, free);
+                particles.position[p] = mesh.nearest_inside(mesh.wrap(free));
             }
         }
     }
     particles.sort(mesh);
-}
-
-fn inside_domain(mesh: &Mesh, p: [f64; 2]) -> [f64; 2] {
-    let p = mesh.wrap(p);
-    [p[0].clamp(mesh.x.start(), mesh.x.end()), p[1].clamp(mesh.y.start(), mesh.y.end())]
 }
 
 /// A place, m, in a part of the domain out of which nothing can flow and whose volume solids change.
@@ -276,11 +272,9 @@ fn side_towards(mesh: &Mesh, cell: usize, other: usize) -> usize {
 /// Whether solids leave a side of a cell open.
 fn is_open(mesh: &Mesh, cell: usize, side: usize) -> bool {
     let Some(parts) = mesh.parts() else { return true };
-    let edge = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
     let is_free = |k: &usize| {
         let t = 2.0 * (*k as f64 + 0.5) / SAMPLES as f64 - 1.0;
-        let r = if side < 2 { [edge, t] } else { [t, edge] };
-        !parts.is_solid(mesh.from_reference(cell, r))
+        !parts.is_solid(mesh.from_reference(cell, side_point(side, t)))
     };
     mesh.part(cell).is_none()
         || (0..SAMPLES).filter(is_free).count() as f64 > CLOSED * SAMPLES as f64

@@ -87,7 +87,7 @@ impl<const D: usize> Stokes<D> {
 
     /// Whether a velocity other than zero is prescribed.
     pub fn is_driven(&self) -> bool {
-        self.constraints.move_something()
+        self.constraints.is_driven()
     }
 
     /// Number of velocity and rotation unknowns, including condensed ones.

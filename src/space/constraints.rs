@@ -95,7 +95,7 @@ impl<const D: usize> Constraints<D> {
     }
 
     /// Whether a velocity other than zero is prescribed.
-    pub fn move_something(&self) -> bool {
+    pub fn is_driven(&self) -> bool {
         let moves =
             |(fixed, value): (&[bool; D], &[f64; D])| (0..2).any(|c| fixed[c] && value[c] != 0.0);
         self.fixed.iter().zip(&self.value).any(moves)

@@ -6,7 +6,7 @@
 //! rule.
 
 use super::outline::Point;
-use super::shape::{GAUSS_3, GAUSS_3_WEIGHTS, NODES};
+use super::shape::{GAUSS_3, GAUSS_3_WEIGHTS, NODES, side_point};
 
 /// Number of squares along a cell that its outline is found with.
 pub const SQUARES: usize = 8;
@@ -55,10 +55,7 @@ pub fn rule(flipped: [bool; 2], distance: impl Fn(Point) -> f64) -> Vec<Weighted
 
 /// The same for a side of a cell (left, right, lower, upper); the weights are shares of the side.
 pub fn side_rule(side: usize, distance: impl Fn(Point) -> f64) -> Vec<Weighted> {
-    let at = |t: f64| {
-        let edge = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
-        if side < 2 { [edge, t] } else { [t, edge] }
-    };
+    let at = |t: f64| side_point(side, t);
     let lines = grid(false);
     let mut out = Vec::new();
     for ends in lines.windows(2) {

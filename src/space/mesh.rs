@@ -270,6 +270,11 @@ impl Mesh {
         let (solid, d) = parts.nearest(self.cell_centre(cell))?;
         (d < 0.0).then_some(solid.velocity)
     }
+    /// Whether a point is in the domain, and not inside of a solid.
+    pub fn holds(&self, p: [f64; 2]) -> bool {
+        let within = |v: f64, axis: &Axis| v >= axis.start() && v <= axis.end();
+        within(p[0], &self.x) && within(p[1], &self.y) && !self.is_solid_at(p)
+    }
     /// Whether a point is inside of a solid.
     pub fn is_solid_at(&self, p: [f64; 2]) -> bool {
         self.is_solid_in(self.locate(p), p)

@@ -19,6 +19,18 @@ pub fn side_normal(side: usize) -> usize {
     side / 2
 }
 
+/// Reference coordinate of a side along its normal, which is also the sign of the normal that points out of
+/// the cell.
+pub fn side_end(side: usize) -> f64 {
+    if side.is_multiple_of(2) { -1.0 } else { 1.0 }
+}
+
+/// Reference coordinates of the point of a side with the coordinate `t` along it.
+pub fn side_point(side: usize, t: f64) -> [f64; 2] {
+    let end = side_end(side);
+    if side_normal(side) == 0 { [end, t] } else { [t, end] }
+}
+
 /// Quadratic Lagrange functions at -1, 0, 1 and their derivatives.
 const fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {
     ([0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)], [t - 0.5, -2.0 * t, t + 0.5])

@@ -6,7 +6,7 @@ use super::measure::CellMeasure;
 use super::mesh::Mesh;
 use super::outline::Point;
 use super::parts::{Part, PartPoint, Parts, Solid};
-use super::shape::{NODES, SIDE_NODES, Shape, side_normal};
+use super::shape::{NODES, SIDE_NODES, Shape, side_end, side_normal};
 use super::stream_fit::fit;
 use std::sync::Arc;
 
@@ -115,7 +115,7 @@ impl Mesh {
         const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
         let through = |side: usize| {
             let c = side_normal(side);
-            let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
+            let sign = side_end(side);
             let nodes = SIDE_NODES[side].iter().zip(SIMPSON);
             let face = self.face(cell, side);
             let along = [-1.0, 0.0, 1.0];
@@ -243,7 +243,7 @@ fn part(
     let mut divergence = [[[0.0; NODES]; 2]; 3];
     for (side, rule) in sides.iter().enumerate() {
         let c = side_normal(side);
-        let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
+        let sign = side_end(side);
         for (r, weight) in rule {
             let area = sign * cell.of_side(side).of_point(*weight, r[1 - c]);
             let n = Shape::values(*r);

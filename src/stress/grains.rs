@@ -37,11 +37,9 @@ const COLUMN: &str = "shape.rectangle = { x = [0, 0.8], y = [0, 0.7] }";
 /// Largest speed of particles of the grains, m/s.
 fn speed_of_grains(run: &dyn Run) -> f64 {
     let particles = run.particles();
-    let units = &run.plan().units;
     let grains = (0..particles.len()).filter(|&p| particles.material[p] == 0);
     grains.fold(0.0, |most: f64, p| {
-        let at = particles.position[p].map(|x| x * units.length);
-        let [u, v, _] = run.velocity_at(at);
+        let [u, v, _] = run.velocity_at(run.plan().si(particles.position[p]));
         most.max(u.hypot(v))
     })
 }

@@ -5,7 +5,6 @@ use crate::cases::{CaseError, plan_of};
 use crate::session::march;
 use crate::sim::criteria::{Criteria, ENERGY_STEPS};
 use crate::sim::{self, Run};
-use crate::space::mesh::Axis;
 use crate::threads;
 use crate::verify::{Bound, Check};
 use std::ops::ControlFlow;
@@ -133,11 +132,7 @@ fn misplaced_volume(run: &dyn Run) -> f64 {
 /// Number of particles outside the domain, inside a solid, or with a position that is not finite.
 fn misplaced(run: &dyn Run) -> usize {
     let mesh = &run.plan().mesh;
-    let inside = |v: f64, axis: &Axis| v >= axis.start() && v <= axis.end();
-    let held =
-        |&&p: &&[f64; 2]| inside(p[0], &mesh.x) && inside(p[1], &mesh.y) && !mesh.is_solid_at(p);
-    let particles = run.particles();
-    particles.len() - particles.position.iter().filter(held).count()
+    run.particles().position.iter().filter(|&&p| !mesh.holds(p)).count()
 }
 
 impl Trial {

@@ -5,7 +5,7 @@ use crate::frame::{SurfacePoint, SurfaceStress};
 use crate::plan::ForceGauge;
 use crate::solve::last_flow::Iterate;
 use crate::space::outline_rule::OutlinePoint;
-use crate::space::shape::side_normal;
+use crate::space::shape::{side_end, side_normal};
 
 /// Smallest cosine of the angle between normals in a cell that belong to one edge of an outline.
 const ONE_EDGE: f64 = 0.8;
@@ -34,7 +34,7 @@ impl<const D: usize> Simulation<D> {
         for segment in &gauge.faces {
             for (cell, side) in segment.free_faces(mesh) {
                 let c = side_normal(side);
-                let edge = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
+                let edge = side_end(side);
                 let (mut r, mut n) = ([0.0; 2], [0.0; 2]);
                 (r[c], n[c]) = (edge, -edge);
                 let along = mesh.cell_centre(cell)[1 - c] - segment.from;
