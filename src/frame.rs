@@ -40,6 +40,17 @@ pub struct Snapshot {
     pub stresses: Vec<SurfaceStress>,
     /// Closed outlines of the solids that move (m).
     pub moving: Vec<Vec<[f32; 2]>>,
+    /// Circles about the axis of a round flow on which the material rotates.
+    pub rings: Vec<Ring>,
+}
+
+/// Circle about the axis of a round flow, with the Cosserat rotation of the material on it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Ring {
+    /// Distance from the axis, and height (m).
+    pub at: [f32; 2],
+    /// Rotation (1/s) about the direction of the circle; positive from x to y.
+    pub rotation: f32,
 }
 
 /// Stresses of the materials along the surface of a side, a wall or a block.

@@ -163,17 +163,13 @@ function schemaAt(path) {
 
 // --- handles ---
 
-// The grips of a part: [point, component or null for both, name], in the order of `points`.
-function grips({ key }) {
-  if (key === "walls" || key === "gauges") return [[0, null, "first end"], [1, null, "second end"]];
-  return [[0, 0, "left side"], [1, 0, "right side"], [0, 1, "lower side"], [1, 1, "upper side"]];
-}
-
-function gripPlace(points, [p, c]) {
-  if (c === null) return points[p];
-  const middle = [0, 1].map((k) => 0.5 * (points[0][k] + points[1][k]));
-  middle[c] = points[p][c];
-  return middle;
+// The place of a grip: a point, or the middle of all points along the component that does not move.
+function gripPlace(points, { moves, along }) {
+  const at = [...points[moves[0]]];
+  if (along === null) return at;
+  const other = 1 - along;
+  at[other] = points.reduce((sum, point) => sum + point[other], 0) / points.length;
+  return at;
 }
 
 function placeHandles() {
@@ -182,11 +178,11 @@ function placeHandles() {
   const at = ([x, y]) => [place.X(x) / scene.view.unit, place.Y(y) / scene.view.unit];
   const parts = [];
   scene.draft.handles.forEach((handle) => {
-    for (const grip of grips(handle)) {
+    for (const grip of handle.grips) {
       const [x, y] = at(gripPlace(handle.points, grip));
       const where = gripPlace(handle.points, grip).map((v) => short(v, 4)).join(", ");
-      const node = draw("circle", { class: "grip", cx: x, cy: y, r: handle.key === "gauges" ? 6 : 5, tabindex: 0, role: "button", "aria-label": `${handle.key} ${handle.name}, ${grip[2]}: ${where} m; arrow keys move it` });
-      node.append(draw("title", {}, `${handle.name}, ${grip[2]}`));
+      const node = draw("circle", { class: "grip", cx: x, cy: y, r: handle.what === "gauge" ? 6 : 5, tabindex: 0, role: "button", "aria-label": `${handle.what} ${handle.name}, ${grip.name}: ${where} m; arrow keys move it` });
+      node.append(draw("title", {}, `${handle.name}, ${grip.name}`));
       listenToGrip(node, handle, grip, place);
       parts.push(node);
     }
@@ -197,11 +193,12 @@ function placeHandles() {
 }
 
 function listenToGrip(node, handle, grip, place) {
-  const [p, c] = grip;
   const shifted = (dx, dy) => {
     const points = handle.points.map((point) => [...point]);
-    if (c !== 1) points[p][0] += dx;
-    if (c !== 0) points[p][1] += dy;
+    for (const p of grip.moves) {
+      if (grip.along !== 1) points[p][0] += dx;
+      if (grip.along !== 0) points[p][1] += dy;
+    }
     return points;
   };
   const pixel = scene.view.unit / place.scale; // metres of a pixel of the page
@@ -237,7 +234,7 @@ function listenToGrip(node, handle, grip, place) {
 
 async function move(handle, points) {
   try {
-    const order = { key: handle.key, index: handle.index, points };
+    const order = { id: handle.id, points };
     const { text, answer } = await editRequest({ do: "drag", text: scene.editor.text(), handle: order });
     toast(answer.message, answer.accepted);
     if (text) scene.editor.setText(text, true);

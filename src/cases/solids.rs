@@ -4,16 +4,18 @@
 //! channel    eta u = t (y - H) + (G/2)(H^2 - y^2)  with the shear stress t at the wall y = 0
 //!            t = G H/2  at rest,  t = 0  free slip,  t = (G H/2) H/(H + b)  with the slip length b,
 //!            t = mu p  where it slides with the friction mu under the pressure p
+//! Cosserat   w = (G/2 eta) (y - sinh ky/(k cosh kh)),  y from the middle of a channel of width 2 h
+//!            u = (G/2 eta) (h^2 - y^2) - [G eta_c/(eta (eta + eta_c) k^2)] (1 - cosh ky/cosh kh)
 //! circle     u_theta = A r + C/r,   A a + C/a = -2 b C/a^2
 //! wedge      v_r = -(Q/r)(cos 2 theta - cos 2 alpha)/(sin 2 alpha - 2 alpha cos 2 alpha)
 //! cylinders  F = mu U K, with the mean velocity U of a square array
 //! ```
-//! Channel: force `G` per volume along it. Circle: radius `a`, slip length `b`. Wedge: half-angle `alpha`; converging flow of G. B. Jeffery
+//! Channel: force `G` per volume along it; the Cosserat fluid is free of couples at its walls. Circle: radius `a`, slip length `b`. Wedge: half-angle `alpha`; converging flow of G. B. Jeffery
 //! (1915) and G. Hamel (1917) without inertia. Cylinders: A. S. Sangani, A. Acrivos, "Slow flow past
 //! periodic arrays of cylinders with application to heat transfer", Int. J. Multiphase Flow 8 (1982)
 //! 193.
 
-use super::{Case, CaseError, Exact, Rates, start};
+use super::{Case, CaseError, Exact, Fluid, Rates, start};
 use crate::scene::SceneSource;
 
 /// The lower wall of a channel.
@@ -52,17 +54,8 @@ pub fn slanted_channel(channel: SlantedChannel) -> Case {
         LowerWall::Friction(mu, pressure) => mu * pressure,
     };
     // Distance from the lower wall.
-    let y = format!("({c:?}*(y - 0.5) - {s:?}*(x - 0.5) + {:?})", 0.5 * width);
+    let y = format!("({} + {:?})", across(degrees), 0.5 * width);
     let speed = format!("({stress:?}*({y} - {width:?}) + 0.5*({width:?}^2 - {y}^2))");
-    let corner = |along: f64, across: f64| {
-        format!("[{:?}, {:?}]", 0.5 + along * c - across * s, 0.5 + along * s + across * c)
-    };
-    let (near, far) = (0.5 * width, 3.0);
-    let block = |name: &str, wall: &str, sign: f64| {
-        let corners = [(-2.0, near), (2.0, near), (2.0, far), (-2.0, far)];
-        let corners: Vec<String> = corners.map(|(a, b)| corner(a, sign * b)).into();
-        format!("[[blocks]]\nname = \"{name}\"\n{wall}\nshape.polygon = [{}]\n", corners.join(", "))
-    };
     let no_slip = "kind = \"no_slip\"";
     let (mut law, mut reference) = (no_slip.to_string(), String::new());
     match lower {
@@ -76,9 +69,13 @@ pub fn slanted_channel(channel: SlantedChannel) -> Case {
     }
     let text = format!(
         "{}[body_force]\nx = {c:?}\ny = {s:?}\n{reference}{}{}",
-        open_box("slanted_channel", &format!("{c:?}*{speed}"), &format!("{s:?}*{speed}")),
-        block("lower", &law, -1.0),
-        block("upper", no_slip, 1.0),
+        open_box(
+            "slanted_channel",
+            FLUID,
+            &[("velocity_x", format!("{c:?}*{speed}")), ("velocity_y", format!("{s:?}*{speed}"))]
+        ),
+        bank("lower", &law, (degrees, -0.5 * width)),
+        bank("upper", no_slip, (degrees, 0.5 * width)),
     );
     let pressure = if let LowerWall::Friction(_, p) = lower { p } else { 0.0 };
     Case {
@@ -109,7 +106,11 @@ pub fn slipping_circle(b: f64) -> Case {
     let text = format!(
         "{}[[blocks]]\nname = \"circle\"\nslip_length = {b:?}\n\
          shape.circle = {{ centre = [{:?}, {:?}], radius = {RADIUS:?} }}\n",
-        open_box("slipping_circle", &format!("-{y}*{turning}"), &format!("{x}*{turning}")),
+        open_box(
+            "slipping_circle",
+            FLUID,
+            &[("velocity_x", format!("-{y}*{turning}")), ("velocity_y", format!("{x}*{turning}"))]
+        ),
         CENTRE[0],
         CENTRE[1]
     );
@@ -131,16 +132,79 @@ pub fn slipping_circle(b: f64) -> Case {
     }
 }
 
-/// Scene of a unit box with a fluid of viscosity one and the given velocity on its sides.
-fn open_box(name: &str, u: &str, v: &str) -> String {
-    let sides = ["left", "right", "bottom", "top"]
-        .map(|side| format!("{side} = {{ velocity_x = \"{u}\", velocity_y = \"{v}\" }}\n"));
+/// A fluid of viscosity one.
+const FLUID: &str = "[materials.fluid]\nshear_viscosity = 1\n[[regions]]\nmaterial = \"fluid\"\n";
+
+/// Scene of a unit box with a fluid and the given conditions on all its sides.
+fn open_box(name: &str, fluid: &str, conditions: &[(&str, String)]) -> String {
+    let conditions: Vec<String> =
+        conditions.iter().map(|(key, value)| format!("{key} = \"{value}\"")).collect();
+    let conditions = conditions.join(", ");
+    let sides = ["left", "right", "bottom", "top"].map(|s| format!("{s} = {{ {conditions} }}\n"));
     format!(
         "schema = 1\nname = \"{name}\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[time]\nend = 1\n\
-         [materials.fluid]\nshear_viscosity = 1\n[[regions]]\nmaterial = \"fluid\"\n\
-         [boundaries]\n{}",
+         {fluid}[boundaries]\n{}",
         sides.concat()
     )
+}
+
+/// Distance from the line through the middle of the box at an angle to the x axis, as an expression.
+fn across(degrees: f64) -> String {
+    let (s, c) = degrees.to_radians().sin_cos();
+    format!("({c:?}*(y - 0.5) - {s:?}*(x - 0.5))")
+}
+
+/// A block on one side of a channel at an angle to the x axis, whose wall has the given distance from the
+/// middle of the box.
+fn bank(name: &str, law: &str, (degrees, distance): (f64, f64)) -> String {
+    let (s, c) = degrees.to_radians().sin_cos();
+    let corner = |along: f64, across: f64| {
+        format!("[{:?}, {:?}]", 0.5 + along * c - across * s, 0.5 + along * s + across * c)
+    };
+    let far = 3.0 * distance.signum();
+    let corners = [(-2.0, distance), (2.0, distance), (2.0, far), (-2.0, far)];
+    let corners: Vec<String> = corners.map(|(a, b)| corner(a, b)).into();
+    format!("[[blocks]]\nname = \"{name}\"\n{law}\nshape.polygon = [{}]\n", corners.join(", "))
+}
+
+/// Flow of a Cosserat fluid along a channel across the mesh, free of couples at its walls, driven by a unit
+/// force. Exact velocity and rotation are prescribed on the sides of the box.
+pub fn slanted_cosserat(fluid: Fluid, degrees: f64, width: f64) -> Case {
+    let (s, c) = degrees.to_radians().sin_cos();
+    let (h, k) = (0.5 * width, fluid.k());
+    let (eta, eta_c) = (fluid.shear, fluid.coupling);
+    let [half, lag] = [0.5 / eta, eta_c / (eta * (eta + eta_c) * k * k)];
+    let end = (k * h).cosh();
+    let y = across(degrees);
+    let speed = format!("({half:?}*({h:?}^2 - {y}^2) - {lag:?}*(1 - cosh({k:?}*{y})/{end:?}))");
+    let rotation = format!("{half:?}*({y} - sinh({k:?}*{y})/{:?})", k * end);
+    let conditions = [
+        ("velocity_x", format!("{c:?}*{speed}")),
+        ("velocity_y", format!("{s:?}*{speed}")),
+        ("rotation", rotation),
+    ];
+    let no_slip = "kind = \"no_slip\"";
+    let text = format!(
+        "{}[body_force]\nx = {c:?}\ny = {s:?}\n{}{}",
+        open_box("slanted_cosserat", &fluid.toml(), &conditions),
+        bank("lower", no_slip, (degrees, -h)),
+        bank("upper", no_slip, (degrees, h)),
+    );
+    Case {
+        name: "slanted_cosserat".into(),
+        title: "flow of a Cosserat fluid along a channel across the mesh",
+        source: "closed form, theory of Dufour, Muehlhaus and Moresi",
+        scene: SceneSource::new("slanted_cosserat", text),
+        exact: Exact {
+            velocity: Box::new(move |x, y| {
+                let y = c * (y - 0.5) - s * (x - 0.5);
+                let u = half * (h * h - y * y) - lag * (1.0 - (k * y).cosh() / end);
+                [c * u, s * u, half * (y - (k * y).sinh() / (k * end))]
+            }),
+            pressure: Box::new(|_, _| 0.0),
+        },
+        rates: Rates { velocity: 2.0, rotation: Some(2.0), pressure: None },
+    }
 }
 
 /// Converging flow in a wedge with the half-angle `degrees` whose apex is below the unit box. The exact
@@ -166,7 +230,7 @@ pub fn wedge(degrees: f64) -> Case {
     let text = format!(
         "{}[[blocks]]\nname = \"left\"\nkind = \"no_slip\"\nshape.polygon = {}\n\
          [[blocks]]\nname = \"right\"\nkind = \"no_slip\"\nshape.polygon = {}\n",
-        open_box("wedge", &part(&x), &part(&y)),
+        open_box("wedge", FLUID, &[("velocity_x", part(&x)), ("velocity_y", part(&y))]),
         wall(-1.0),
         wall(1.0),
     );

@@ -10,7 +10,7 @@ use crate::record::rerun_log::Sink;
 use crate::record::summary::Ending;
 use crate::record::text::duration;
 use crate::results::Member;
-use crate::scene::{Geometry, Quantity, Scene, SceneSource, Scope, scene_hash};
+use crate::scene::{Quantity, Scene, SceneSource, Scope, scene_hash};
 use crate::session::{
     Budget, Ended, Options, Recording, Safety, Session, tell, wait_for_interrupt, watch_interrupts,
 };
@@ -187,7 +187,7 @@ fn shorten(source: &SceneSource, text: &str) -> Result<Scene, Failure> {
 /// The text printed at the end of a run.
 fn report(ended: &Ended, profile: bool) -> String {
     let s = &ended.summary;
-    let round = s.geometry == Geometry::Axisymmetric;
+    let round = s.geometry.is_round();
     let ending = match s.ending {
         Ending::Finished => "finished",
         Ending::StepLimit => "stopped at the step limit",

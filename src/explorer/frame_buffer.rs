@@ -68,7 +68,17 @@ impl FrameBuffer {
 /// Approximate size of the picture of a frame (bytes).
 fn size(frame: &Frame) -> usize {
     let Some(p) = &frame.snapshot else { return 0 };
-    let Snapshot { particles, dye_lines, glyphs, fields, arrows, isolines, stresses, moving } = p;
+    let Snapshot {
+        particles,
+        dye_lines,
+        glyphs,
+        fields,
+        arrows,
+        isolines,
+        stresses,
+        moving,
+        rings,
+    } = p;
     let arrows = arrows.as_ref().map_or(0, |a| 16 * a.origins.len());
     let strips = isolines.iter().flat_map(|i| &i.strips).chain(moving).map(Vec::len).sum::<usize>();
     14 * particles.positions.len()
@@ -77,6 +87,7 @@ fn size(frame: &Frame) -> usize {
         + 16 * glyphs.len()
         + 4 * fields.iter().map(|f| f.values.len()).sum::<usize>()
         + arrows
+        + 12 * rings.len()
         + 28 * stresses.iter().map(|s| s.points.len()).sum::<usize>()
         + 8 * strips
 }

@@ -3,10 +3,10 @@
 
 use crate::plan::Gauge;
 use crate::space::flow::Flow;
-use crate::space::mesh::Mesh;
+use crate::space::mesh::{Axis, Mesh};
 use crate::space::particles::Particles;
 use crate::space::population::Refill;
-use crate::space::segment::Segment;
+use crate::space::segment::{Line, Segment};
 use crate::space::shape::Shape;
 
 /// A gauge with the volume that has crossed it.
@@ -26,6 +26,8 @@ const SAMPLES: usize = 8;
 /// Widths of the kernel that determines the material at a sample, across and along the gauge, in
 /// cells.
 const KERNEL_WIDTH: [f64; 2] = [0.75, 0.25];
+/// The same for a gauge across cells, whose samples take the particles on both sides.
+const ACROSS_CELLS: [f64; 2] = [0.25; 2];
 
 impl Counter {
     /// A counter at zero.
@@ -49,24 +51,20 @@ impl Counter {
 
     /// Volume that crosses the gauge on a straight path, not wrapped.
     fn crossed(&self, mesh: &Mesh, from: [f64; 2], to: [f64; 2], material: u8, volume: f64) -> f64 {
-        let Gauge { segment: s, sign, .. } = self.gauge;
-        let mut sum = 0.0;
         if material != self.gauge.material {
-            return sum;
+            return 0.0;
         }
-        let (axis, _) = mesh.axes(s.normal);
-        let period = if axis.periodic() { axis.length() } else { 0.0 };
-        let images: &[f64] = if axis.periodic() { &[0.0, -1.0, 1.0] } else { &[0.0] };
-        for image in images {
-            let at = s.at + image * period;
-            let (a, b) = (from[s.normal], to[s.normal]);
-            if (a >= at) == (b >= at) {
-                continue;
-            }
-            let t = (at - a) / (b - a);
-            let along = from[1 - s.normal] + t * (to[1 - s.normal] - from[1 - s.normal]);
-            if along >= s.from && along <= s.to {
-                sum += if b >= at { sign * volume } else { -sign * volume };
+        // Images of the path across periodic sides.
+        let images = |axis: &Axis| {
+            let shifts: &[f64] = if axis.periodic() { &[0.0, -1.0, 1.0] } else { &[0.0] };
+            let period = axis.length();
+            shifts.iter().map(move |s| s * period)
+        };
+        let (line, mut sum) = (self.gauge.line, 0.0);
+        for dy in images(&mesh.y) {
+            for dx in images(&mesh.x) {
+                let shifted = |p: [f64; 2]| [p[0] - dx, p[1] - dy];
+                sum += line.crossed_by(shifted(from), shifted(to)) * self.gauge.sign * volume;
             }
         }
         sum
@@ -83,8 +81,19 @@ impl Counter {
         particles: &Particles,
         background: Option<u8>,
     ) -> f64 {
-        let g = &self.gauge;
-        let Segment { normal, at, from, to } = g.segment;
+        let state = State { mesh, flow, particles, background };
+        self.gauge.sign
+            * match self.gauge.line {
+                Line::Aligned(segment) => self.flux_along_mesh(segment, &state),
+                Line::Slanted(ends) => self.flux_across_cells(ends, &state),
+            }
+    }
+
+    /// Flux along the normal of a segment on mesh lines.
+    fn flux_along_mesh<const D: usize>(&self, segment: Segment, state: &State<D>) -> f64 {
+        let State { mesh, flow, particles, background } = *state;
+        let material = self.gauge.material;
+        let Segment { normal, at, from, to } = segment;
         let (across, along) = mesh.axes(normal);
         let line = across.nearest_line(at);
         let (first, last) = (along.nearest_line(from), along.nearest_line(to));
@@ -107,36 +116,84 @@ impl Counter {
                 }
                 let n = Shape::values(r);
                 let u: f64 = (0..9).map(|a| n[a] * nodal[a][normal]).sum();
-                let mut mean = KernelMean::new(mesh, owner, (r, normal), g.material);
+                let mut mean = KernelMean::new(
+                    mesh,
+                    (owner, r),
+                    (segment.unit_normal(), KERNEL_WIDTH),
+                    material,
+                );
                 let upstream = if u > 0.0 { below.or(above) } else { above.or(below) };
                 for near in around.clone().filter_map(|k| cell(upstream, k)) {
                     mean.add(particles, near);
                 }
-                let share = mean.value().unwrap_or(f64::from(background == Some(g.material)));
-                flux += g.sign * share * u * face.of_point(1.0, t) / SAMPLES as f64;
+                let share = mean.value().unwrap_or(f64::from(background == Some(material)));
+                flux += share * u * face.of_point(1.0, t) / SAMPLES as f64;
             }
         }
         flux
     }
+
+    /// Flux along the normal of a line in any direction. The fraction of the material at a sample is a mean
+    /// over the particles of the cells around.
+    fn flux_across_cells<const D: usize>(&self, ends: [[f64; 2]; 2], state: &State<D>) -> f64 {
+        let State { mesh, flow, particles, background } = *state;
+        let material = self.gauge.material;
+        let line = self.gauge.line;
+        let normal = line.normal();
+        let mut flux = 0.0;
+        for (x, length) in Line::samples(ends, mesh, SAMPLES) {
+            if mesh.is_solid_at(x) {
+                continue;
+            }
+            let v = flow.at(mesh, x);
+            let u = normal[0] * v[0] + normal[1] * v[1];
+            let owner = mesh.locate(x);
+            let r = mesh.to_reference(owner, x);
+            let mut mean = KernelMean::new(mesh, (owner, r), (normal, ACROSS_CELLS), material);
+            mesh.block(owner).for_each(|near| mean.add(particles, near));
+            let share = mean.value().unwrap_or(f64::from(background == Some(material)));
+            flux += share * u * length * mesh.thickness(x);
+        }
+        flux
+    }
+}
+
+/// What the flux is measured on.
+#[derive(Clone, Copy)]
+struct State<'a, const D: usize> {
+    mesh: &'a Mesh,
+    flow: &'a Flow<D>,
+    particles: &'a Particles,
+    background: Option<u8>,
 }
 
 /// Volume fraction of a material near a point: a mean over particles with a Gaussian kernel.
 struct KernelMean<'a> {
     mesh: &'a Mesh,
     at: [f64; 2],
-    width: [f64; 2],
+    /// Unit vectors across and along the gauge, with the widths of the kernel.
+    axes: [([f64; 2], f64); 2],
     material: u8,
     of_material: f64,
     of_all: f64,
 }
 
 impl<'a> KernelMean<'a> {
-    /// A mean without particles, at reference coordinates `r` of a cell.
-    fn new(mesh: &'a Mesh, cell: usize, (r, normal): ([f64; 2], usize), material: u8) -> Self {
+    /// A mean without particles, at reference coordinates `r` of a cell, for a gauge with the given normal;
+    /// `widths`: of the kernel across and along the gauge, in cells.
+    fn new(
+        mesh: &'a Mesh,
+        (cell, r): (usize, [f64; 2]),
+        (normal, widths): ([f64; 2], [f64; 2]),
+        material: u8,
+    ) -> Self {
         let size = mesh.cell_size(cell);
-        let width = [0, 1].map(|c| KERNEL_WIDTH[usize::from(c != normal)] * size[c]);
+        let along = [normal[1], -normal[0]];
+        let width = |unit: [f64; 2]| (unit[0] * size[0]).abs() + (unit[1] * size[1]).abs();
+        let axes = [(normal, widths[0]), (along, widths[1])];
+        let axes = axes.map(|(unit, share)| (unit, share * width(unit)));
         let at = mesh.from_reference(cell, r);
-        KernelMean { mesh, at, width, material, of_material: 0.0, of_all: 0.0 }
+        KernelMean { mesh, at, axes, material, of_material: 0.0, of_all: 0.0 }
     }
 
     /// Adds the particles of a cell.
@@ -144,8 +201,11 @@ impl<'a> KernelMean<'a> {
         let [x, y] = &[&self.mesh.x, &self.mesh.y];
         for p in particles.of_cell(cell) {
             let position = particles.position[p];
-            let dx = x.nearest_image(position[0] - self.at[0]) / self.width[0];
-            let dy = y.nearest_image(position[1] - self.at[1]) / self.width[1];
+            let d = [
+                x.nearest_image(position[0] - self.at[0]),
+                y.nearest_image(position[1] - self.at[1]),
+            ];
+            let [dx, dy] = self.axes.map(|(e, width)| (d[0] * e[0] + d[1] * e[1]) / width);
             // The constant avoids a zero sum of weights if all particles are far from the point.
             let w = particles.volume[p] * ((-(dx * dx + dy * dy)).exp() + 1e-30);
             self.of_all += w;

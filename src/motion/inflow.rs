@@ -192,7 +192,7 @@ impl Inflow {
             if let Some(part) = mesh.part(cell)
                 && mesh.is_solid_in(cell, at)
             {
-                at = mesh.free_place(cell, part);
+                at = mesh.free_place(cell, part).unwrap_or(at);
             }
             let volume = volume / parts;
             add(Entry { cell, material, volume, at, from, through, carried });

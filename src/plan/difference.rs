@@ -73,7 +73,7 @@ fn slips(p: &Plan) -> Vec<SlipFace> {
 fn lines(p: &Plan) -> (Vec<Gauge>, Option<Tracers>, Vec<[f64; 5]>) {
     let l = p.units.length;
     let gauges = p.gauges.iter().cloned();
-    let gauges = gauges.map(|g| Gauge { segment: g.segment.scaled(l), ..g });
+    let gauges = gauges.map(|g| Gauge { line: g.line.scaled(l), ..g });
     let dye = p.tracers.as_ref().map(|t| Tracers {
         lines: t.lines.iter().map(|s| s.iter().map(|p| p.map(|v| v * l)).collect()).collect(),
         spacing: t.spacing * l,

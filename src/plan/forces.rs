@@ -90,6 +90,12 @@ pub(super) fn force_gauges(
     for (side, name) in boundary.sides.iter().zip(SIDES) {
         add(name, side.pieces.iter().map(|p| p.segment).collect());
     }
+    // Thin walls carry what presses on them, also where a solid lies behind them, such as a gate.
+    let mut on_wall = vec![[false; 2]; mesh.nodes()];
+    for wall in &walls.walls {
+        let segment = on_mesh(&wall.segment);
+        segment.nodes(mesh).for_each(|node| on_wall[node][segment.normal] = true);
+    }
     // The support of each node by component; the first one that claims it.
     let mut owner = vec![[usize::MAX; 2]; mesh.nodes()];
     let given = boundary.constraints::<2>(mesh, units);
@@ -97,9 +103,11 @@ pub(super) fn force_gauges(
         let along_lines = aligned(mesh, parts, |node| relations.holds(node));
         let sites = relations.nodes().chain(along_lines.into_iter().map(|(node, ..)| node));
         for node in sites {
+            let behind = |c: usize| on_wall[node][c] && !relations.holds(node);
             if let Some((solid, _)) = parts.nearest(mesh.node_position(node)) {
                 let index = supports[..solids].iter().position(|s| s.name == solid.name);
-                owner[node] = [index.unwrap_or(usize::MAX); 2];
+                let index = index.unwrap_or(usize::MAX);
+                (0..2).filter(|&c| !behind(c)).for_each(|c| owner[node][c] = index);
             }
         }
     }

@@ -37,7 +37,7 @@ use crate::space::constraints::PressurePoint;
 use crate::space::mesh::Mesh;
 use crate::space::outline::Outline;
 use crate::space::seeding::Seeding;
-use crate::space::segment::Segment;
+use crate::space::segment::Line;
 use crate::space::walls::Enclosure;
 use material::Material;
 use std::sync::Arc;
@@ -231,13 +231,13 @@ pub struct InitialFields {
     pub density: Option<FieldFn>,
 }
 
-/// A segment that measures the volume of a material that crosses it, in the plan's units.
+/// A line that measures the volume of a material that crosses it, in the plan's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gauge {
     /// Name of the gauge.
     pub name: String,
-    /// The segment; it lies on mesh lines.
-    pub segment: Segment,
+    /// The line; along a coordinate direction it lies on mesh lines.
+    pub line: Line,
     /// +1 if crossing along the normal counts as positive, otherwise -1.
     pub sign: f64,
     /// Index of the material that is measured.

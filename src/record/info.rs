@@ -5,9 +5,8 @@ use crate::frame::{
 };
 use crate::plan::Plan;
 use crate::plan::boundary::SIDES;
-use crate::scene::{Block, ColourBy, FieldName, Geometry, SolidShape, scene_hash, to_toml};
+use crate::scene::{Block, ColourBy, FieldName, SolidShape, scene_hash, to_toml};
 use crate::sim::row::{Panel, Place, Row, places};
-use crate::space::segment::Segment;
 
 /// Name of the last class of materials: particles marked by dye.
 const MARKED: &str = "marked";
@@ -17,15 +16,15 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
     let f = |v: f64| (v * plan.units.length) as f32;
     let (x, y) = (&plan.mesh.x, &plan.mesh.y);
     let domain = Rect { min: [f(x.start()), f(y.start())], max: [f(x.end()), f(y.end())] };
-    let round = plan.scene.domain.geometry == Geometry::Axisymmetric;
-    let ends = |s: &Segment| s.ends().map(|p| p.map(f)).to_vec();
+    let round = plan.scene.domain.geometry.is_round();
+    let drawn = |ends: [[f64; 2]; 2]| ends.map(|p| p.map(f)).to_vec();
     // Openings in a side are gaps in its line; a side without parts is drawn whole, open or not.
     let mut walls: Vec<Outline> = plan
         .boundary
         .pieces()
         .filter(|(s, piece)| plan.boundary.sides[*s].pieces.len() == 1 || !piece.open)
         .filter(|(s, _)| !(round && *s == 0 && x.start() == 0.0))
-        .map(|(s, piece)| Outline { name: SIDES[s].into(), points: ends(&piece.segment) })
+        .map(|(s, piece)| Outline { name: SIDES[s].into(), points: drawn(piece.segment.ends()) })
         .collect();
     let aligned = |b: &&Block| {
         matches!(b.shape, None | Some(SolidShape::Rectangle { .. }))
@@ -45,7 +44,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
             .obstacles
             .iter()
             .zip(names)
-            .map(|(o, name)| Outline { name, points: ends(o) }),
+            .map(|(o, name)| Outline { name, points: drawn(o.ends()) }),
     );
     let moves = |name: &str| plan.moving.iter().any(|m| m.name == name);
     let solids = plan.mesh.parts().into_iter().flat_map(|parts| &parts.solids);
@@ -76,7 +75,7 @@ pub fn run_info(plan: &Plan, name: &str) -> RunInfo {
         gauges: plan
             .gauges
             .iter()
-            .map(|g| Outline { name: g.name.clone(), points: ends(&g.segment) })
+            .map(|g| Outline { name: g.name.clone(), points: drawn(g.line.ends()) })
             .collect(),
         materials,
         particle_radius: f(0.5 * sizes(x).min(sizes(y)) / side),

@@ -11,7 +11,7 @@
 //! | `world/fields/<field>/{image,bar,ticks,isolines}` | one field |
 //! | `world/fields/<field>/values` | its values, on half as many samples per side |
 //! | the path of each scalar, and `<path>/log10` | the plots |
-//! | `round/{first,second,dye,walls,outlines}` | a round flow in three dimensions, see `round.rs` |
+//! | `round/{first,second,dye,rings,walls,outlines}` | a round flow in three dimensions, see `round.rs` |
 //! | `scene`, `plan`, `log` | input, solved effects, warnings |
 //!
 //! Timelines are `sim_time`, `step` and `wall_time`. Positions are in metres with y up. The viewer
@@ -185,10 +185,10 @@ pub struct RerunLog {
     isolines: HashSet<EntityPath>,
     /// Whether the flow is round, so that there is a view in three dimensions.
     round: bool,
-    /// Whether classes or radii changed with the last picture.
-    round_changed: bool,
     /// Number of dyed lines that were swept last.
     round_lines: usize,
+    /// Places of the rings of rotation that were drawn last (m).
+    round_rings: Vec<[f32; 2]>,
     pictures: u64,
 }
 
@@ -279,8 +279,8 @@ impl RerunLog {
             scales: HashMap::new(),
             isolines: HashSet::new(),
             round: info.round,
-            round_changed: true,
             round_lines: 0,
+            round_rings: Vec::new(),
             pictures: 0,
         }
     }

@@ -4,7 +4,7 @@ use super::error::{MAX_ERRORS, SceneError};
 use super::expr;
 use super::quantity::Quantity;
 use super::scope::Scope;
-use super::types::{Geometry, Parameter, Scene};
+use super::types::{Parameter, Scene};
 
 /// Distance of a domain from zero, in its sizes, beyond which positions are computed relative to its
 /// corner. Nearer to zero, coordinates lose no more than three of their sixteen digits.
@@ -56,7 +56,7 @@ impl Scope {
         let size = (x[1] - x[0]).max(y[1] - y[0]);
         let far = [x, y].iter().flatten().any(|v| v.abs() > FAR * size);
         // A radius is measured from the axis.
-        let left = if scene.domain.geometry == Geometry::Plane { x[0] } else { 0.0 };
+        let left = if scene.domain.geometry.is_round() { 0.0 } else { x[0] };
         if far && size > 0.0 { [left, y[0]] } else { [0.0; 2] }
     }
 

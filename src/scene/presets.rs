@@ -5,7 +5,7 @@ use super::load::parse;
 use super::source::SceneSource;
 
 /// Names and TOML texts of the presets.
-const PRESETS: [(&str, &str); 27] = [
+const PRESETS: [(&str, &str); 28] = [
     ("silo", include_str!("../../presets/silo.toml")),
     ("shear_alignment", include_str!("../../presets/shear_alignment.toml")),
     ("couette_cosserat", include_str!("../../presets/couette_cosserat.toml")),
@@ -27,6 +27,7 @@ const PRESETS: [(&str, &str); 27] = [
     ("funnel_stones", include_str!("../../presets/funnel_stones.toml")),
     ("flow_past_cylinder", include_str!("../../presets/flow_past_cylinder.toml")),
     ("piston", include_str!("../../presets/piston.toml")),
+    ("gate", include_str!("../../presets/gate.toml")),
     ("round_silo", include_str!("../../presets/round_silo.toml")),
     ("round_hourglass", include_str!("../../presets/round_hourglass.toml")),
     ("pipe_cosserat", include_str!("../../presets/pipe_cosserat.toml")),

@@ -155,6 +155,11 @@ pub enum Geometry {
 }
 
 impl Geometry {
+    /// Whether the flow is round.
+    pub fn is_round(self) -> bool {
+        self == Geometry::Axisymmetric
+    }
+
     /// The unit of a quantity of a run, from that in the plane, where volumes, forces, powers and energies
     /// are per metre of depth.
     pub fn unit(self, in_plane: &'static str) -> &'static str {
@@ -1186,7 +1191,8 @@ pub struct Acceleration {
     pub y: Field,
 }
 
-/// A segment along a mesh line that measures the volume of a material that crosses it.
+/// A line that measures the volume of a material that crosses it. Horizontal and vertical lines are mesh
+/// lines; other lines may cross cells.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gauge {

@@ -272,7 +272,7 @@ impl<const D: usize> Simulation<D> {
             nonlinear: r.iterations,
             ill_posed_share,
             kinetic_energy,
-            max_speed: self.flow.max_speed() * u.velocity(),
+            max_speed: self.flow.max_speed_of(|node| !self.reach.inside(node)) * u.velocity(),
             rms_speed: self.flow.rms_speed(&plan.mesh) * u.velocity(),
             volume_error: self.volume_error(),
             potential_energy,

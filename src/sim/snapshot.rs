@@ -7,7 +7,7 @@ mod stresses;
 use super::initial::Unfilled;
 use super::simulation::Simulation;
 use super::yielding::Local;
-use crate::frame::{Arrows, GridField, ParticleScalar, ParticleSnapshot, Snapshot};
+use crate::frame::{Arrows, GridField, ParticleScalar, ParticleSnapshot, Ring, Snapshot};
 use crate::laws::director;
 use crate::motion::tracers::DyeLines;
 use crate::plan::Plan;
@@ -27,6 +27,8 @@ const SAMPLE_GRAIN: usize = 2048;
 const FIELD_SAMPLES: f64 = 240.0;
 /// Number of arrows along the longer side of the domain.
 const ARROWS: f64 = 28.0;
+/// Number of rings of rotation along the longer side of the domain.
+const RINGS: f64 = 16.0;
 /// Levels of mean |n_x| that are drawn; the first is near 2/pi, the mean of random directors.
 const ALIGNMENT_LEVELS: [f32; 6] = [0.6, 0.5, 0.4, 0.3, 0.2, 0.1];
 
@@ -135,7 +137,25 @@ impl<const D: usize> Simulation<D> {
             isolines,
             stresses: self.stresses(),
             moving: moving(plan),
+            rings: self.rings(),
         }
+    }
+
+    /// The rotation of Cosserat materials on circles about the axis, at the points of a coarse raster.
+    fn rings(&self) -> Vec<Ring> {
+        let plan = &self.plan;
+        if D != 3 || !plan.scene.domain.geometry.is_round() {
+            return vec![];
+        }
+        let raster = Raster::new(plan, RINGS);
+        let mesh = &plan.mesh;
+        let ring = |k: usize| {
+            let x = raster.centre(k);
+            let rotation = self.flow.at(mesh, x)[D - 1] * plan.units.rate();
+            (!mesh.is_solid_at(x) && self.rotates(mesh.locate(x)))
+                .then(|| Ring { at: plan.si(x).map(|c| c as f32), rotation: rotation as f32 })
+        };
+        (0..raster.len()).filter_map(ring).collect()
     }
 
     fn draw_particles(&self) -> ParticleSnapshot {

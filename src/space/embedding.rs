@@ -23,7 +23,7 @@
 use super::mesh::Mesh;
 use super::outline::Point;
 use super::parts::{Parts, Solid};
-use super::shape::NODES;
+use super::shape::{NODES, SIDE_NODES, side_normal};
 
 /// Distance, in cells, below which a node is on an outline.
 const ON_OUTLINE: f64 = 1e-9;
@@ -120,15 +120,36 @@ impl Embedding {
                 site.at_rest |= part.unresolved;
             }
         }
+        let walled = if parts.move_on() { walled(mesh, parts) } else { vec![] };
         let mut out = Embedding { nodes: vec![], index: vec![NONE; mesh.nodes()], cells: vec![] };
         for (node, site) in sites.iter().enumerate() {
             let Some(site) = site else { continue };
             let given = [0, 1].map(|c| given(node, c));
             out.index[node] = out.nodes.len() as u32;
-            out.nodes.push(relation(node, site, &sites, given));
+            let mut relation = relation(node, site, &sites, given);
+            if site.moves() {
+                let held = |c: usize| given[c].filter(|_| walled[node][c]);
+                relation.hold([held(0), held(1)]);
+            }
+            out.nodes.push(relation);
         }
+        out.leave_idle(&sites);
         out.cells = (0..mesh.cells()).map(|cell| out.map_of(mesh, cell)).collect();
         out
+    }
+
+    /// Finds the unknowns beside moving solids on which nothing depends.
+    fn leave_idle(&mut self, sites: &[Option<Site>]) {
+        let mut used = vec![[false; 2]; self.index.len()];
+        for (k, map) in self.nodes.iter().flat_map(|n| &n.terms) {
+            (0..2).for_each(|c| used[*k as usize][c] |= map[0][c] != 0.0 || map[1][c] != 0.0);
+        }
+        for n in &mut self.nodes {
+            let node = n.node as usize;
+            if sites[node].as_ref().is_some_and(Site::moves) {
+                (0..2).for_each(|c| n.idle[c] |= !used[node][c]);
+            }
+        }
     }
 
     fn node(&self, node: usize) -> Option<&Node> {
@@ -228,7 +249,25 @@ impl Embedding {
     }
 }
 
+impl Site {
+    /// Whether its solid moves.
+    fn moves(&self) -> bool {
+        self.velocity != [0.0; 2]
+    }
+}
+
 impl Node {
+    /// Gives the node velocities that other conditions prescribe through sides and blocks: where a moving
+    /// solid comes close to them, nothing flows through them. The unknown of a corner is free then, for the
+    /// other nodes of its cells: the slope of the velocity in the gap does not hold for the rest of a cell.
+    fn hold(&mut self, given: [Option<f64>; 2]) {
+        for (c, u) in given.into_iter().enumerate().filter_map(|(c, u)| Some((c, u?))) {
+            self.offset[c] = u;
+            self.terms.iter_mut().for_each(|(_, map)| map[c] = [0.0; 2]);
+            self.given[c] = None;
+        }
+    }
+
     /// The unknown of the node for its velocity.
     fn unknown(&self, u: [f64; 2]) -> [f64; 2] {
         let own = self.terms.iter().find(|(k, _)| *k == self.node);
@@ -246,6 +285,21 @@ impl Node {
     }
 }
 
+/// Components of the velocity of each node through sides of the domain and blocks along mesh lines.
+fn walled(mesh: &Mesh, parts: &Parts) -> Vec<[bool; 2]> {
+    let mut out = vec![[false; 2]; mesh.nodes()];
+    let block = |cell: usize| mesh.solid[cell] && !parts.is_solid(mesh.cell_centre(cell));
+    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let nodes = mesh.cell_nodes(cell);
+        for (side, on_side) in SIDE_NODES.iter().enumerate() {
+            if mesh.beyond(cell, side).is_none_or(block) {
+                on_side.iter().for_each(|&a| out[nodes[a]][side_normal(side)] = true);
+            }
+        }
+    }
+    out
+}
+
 /// Unit of the distances: the mean size of the cells.
 fn unit(mesh: &Mesh) -> f64 {
     let size = |n: f64, length: f64| length / n;
@@ -258,10 +312,10 @@ fn relation(node: usize, site: &Site, sites: &[Option<Site>], given: [Option<f64
     let own = node as u32;
     let offset = site.velocity;
     let mut out = Node { node: own, terms: vec![], offset, idle: [true; 2], given: [None; 2] };
+    let (d, n) = (site.distance, site.normal);
     if site.at_rest {
         return out;
     }
-    let (d, n) = (site.distance, site.normal);
     let along = [-n[1], n[0]];
     let across = n[0] * offset[0] + n[1] * offset[1];
     if !site.no_slip {
@@ -275,14 +329,17 @@ fn relation(node: usize, site: &Site, sites: &[Option<Site>], given: [Option<f64
             let value = |c: usize, u: f64| if d.abs() > NEAR { (u - offset[c]) / d } else { 0.0 };
             out.given = [0, 1].map(|c| given[c].map(|u| value(c, u)));
         } else if let (Some(c), true) = (held, given.iter().flatten().all(|&u| u == 0.0)) {
-            // The component that a side of the domain leaves free is normal to the wall in part.
+            // The component that a side of the domain leaves free is normal to the wall in part, or along
+            // a wall that lies on the side.
+            let along_side = n[1 - c].abs() < NEAR;
+            let (d, offset) = if along_side { (1.0, 0.0) } else { (d, offset[1 - c]) };
             let mut map = [[0.0; 2]; 2];
             map[1 - c][1 - c] = d;
             out.terms.push((own, map));
             out.idle[c] = true;
             out.offset = [0.0; 2];
-            out.offset[1 - c] = offset[1 - c];
-            let value = |u: f64| if d.abs() > NEAR { (u - offset[1 - c]) / d } else { u };
+            out.offset[1 - c] = offset;
+            let value = |u: f64| if d.abs() > NEAR { (u - offset) / d } else { u };
             out.given[1 - c] = given[1 - c].map(value);
         } else {
             out.terms.push((own, [[along[0], n[0] * d], [along[1], n[1] * d]]));

@@ -101,7 +101,13 @@ impl<const D: usize> Flow<D> {
 
     /// Largest nodal speed.
     pub fn max_speed(&self) -> f64 {
-        self.velocity.iter().map(|u| u[0].hypot(u[1])).fold(0.0, f64::max)
+        self.max_speed_of(|_| true)
+    }
+
+    /// The largest speed of the nodes that `counts` selects.
+    pub fn max_speed_of(&self, counts: impl Fn(usize) -> bool) -> f64 {
+        let nodes = self.velocity.iter().enumerate().filter(|(node, _)| counts(*node));
+        nodes.map(|(_, u)| u[0].hypot(u[1])).fold(0.0, f64::max)
     }
 
     /// Root-mean-square speed over all cells that are not solid.

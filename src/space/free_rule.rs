@@ -54,13 +54,21 @@ pub fn rule(flipped: [bool; 2], distance: impl Fn(Point) -> f64) -> Vec<Weighted
 }
 
 /// The same for a side of a cell (left, right, lower, upper); the weights are shares of the side.
-pub fn side_rule(side: usize, distance: impl Fn(Point) -> f64) -> Vec<Weighted> {
+/// Pieces with both ends within the distance `on_side` are not free.
+pub fn side_rule(
+    side: usize,
+    on_side: Option<f64>,
+    distance: impl Fn(Point) -> f64,
+) -> Vec<Weighted> {
     let at = |t: f64| side_point(side, t);
     let lines = grid(false);
     let mut out = Vec::new();
     for ends in lines.windows(2) {
         let [mut low, mut high] = [ends[0], ends[1]];
         let [a, b] = [low, high].map(|t| distance(at(t)));
+        if on_side.is_some_and(|most| a.abs() <= most && b.abs() <= most) {
+            continue;
+        }
         let root = low + (high - low) * a / (a - b);
         match (a >= 0.0, b >= 0.0) {
             (false, false) => continue,

@@ -347,6 +347,20 @@ impl Mesh {
     pub fn nearest_inside(&self, p: [f64; 2]) -> [f64; 2] {
         [self.x.nearest_inside(p[0]), self.y.nearest_inside(p[1])]
     }
+    /// The cell beyond a side of a cell (left, right, bottom, top); `None` beyond the domain.
+    pub fn beyond(&self, cell: usize, side: usize) -> Option<usize> {
+        let (i, j) = self.cell_ij(cell);
+        let (axis, k) = if side < 2 { (&self.x, i) } else { (&self.y, j) };
+        let last = axis.cells() - 1;
+        let next = match (side % 2, k) {
+            (0, 0) => axis.periodic.then_some(last)?,
+            (0, _) => k - 1,
+            _ if k == last => axis.periodic.then_some(0)?,
+            _ => k + 1,
+        };
+        Some(if side < 2 { self.cell(next, j) } else { self.cell(i, next) })
+    }
+
     /// The cells that share a corner with a cell, including itself and periodic neighbours; at most
     /// nine.
     pub fn block(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {

@@ -242,6 +242,8 @@ impl Population {
     }
 
     /// Refills an empty cell with half of the largest particle of its neighbours, if there is one.
+    /// Puts half of a neighbour's largest particle into an empty cell. `None` if no neighbour has any, or if
+    /// the free part of the cell is too small to hold one.
     fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> Option<Refill> {
         let donor = cheapest(
             self.neighbours.of(cell).flat_map(|n| particles.of_cell(n).map(move |p| (n, p))).map(
@@ -252,13 +254,14 @@ impl Population {
             ),
         )?;
         let (from, donor) = donor;
+        let place = match mesh.part(cell) {
+            Some(part) => mesh.free_place(cell, part)?,
+            None => mesh.cell_centre(cell),
+        };
         particles.volume[donor] *= 0.5;
         particles.duplicate(donor);
         let child = particles.len() - 1;
-        particles.position[child] = match mesh.part(cell) {
-            Some(part) => mesh.free_place(cell, part),
-            None => mesh.cell_centre(cell),
-        };
+        particles.position[child] = place;
         let (material, volume) = (particles.material[child], particles.volume[child]);
         Some(Refill { cells: [from, cell], material, volume })
     }

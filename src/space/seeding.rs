@@ -35,7 +35,8 @@ impl Seeding {
         if let Some(part) = mesh.part(cell) {
             all.retain(|&p| !mesh.is_solid_in(cell, p));
             if all.is_empty() {
-                all.push(mesh.free_place(cell, part));
+                let centroid = || mesh.from_reference(cell, part.centroid());
+                all.push(mesh.free_place(cell, part).unwrap_or_else(centroid));
             }
         }
         all

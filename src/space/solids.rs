@@ -16,6 +16,13 @@ const SOLID: f64 = 1e-7;
 /// Fraction of a cell up to which solids in it are ignored.
 const WHOLE: f64 = 1e-9;
 
+/// Distance, in cells, of a solid from a side of a cell up to which it lies on the side, if solids move: a
+/// little more than of a solid whose cell has no free part.
+const ON_SIDE: f64 = 2.0 * SOLID;
+
+/// Share of the side of a cell from which a solid that lies on it counts.
+const TOUCHED: f64 = 1e-6;
+
 /// Part of the side of a cell up to which what is given on it is taken as constant.
 const NARROW: f64 = 0.05;
 
@@ -55,8 +62,16 @@ impl Mesh {
             let unresolved = is_lost(&self, cell, &parts);
             if fraction <= SOLID {
                 self.solid[cell] = true;
-            } else if fraction < 1.0 - WHOLE || unresolved {
-                let sides = std::array::from_fn(|side| side_rule(side, distance));
+                continue;
+            }
+            // What lies on a side moves with its solid, so that the side is not free.
+            let on_side = parts.move_on().then_some(ON_SIDE * hx.min(hy));
+            let sides = std::array::from_fn(|side| side_rule(side, on_side, distance));
+            let touched = || {
+                let free = |rule: &Vec<Weighted>| rule.iter().map(|(_, w)| w).sum::<f64>();
+                on_side.is_some() && sides.iter().any(|rule| free(rule) < 1.0 - TOUCHED)
+            };
+            if fraction < 1.0 - WHOLE || unresolved || touched() {
                 let part = part(measure, (fraction, rule), &sides, unresolved);
                 parts.cells[cell] = Some(Box::new(part));
             }
@@ -166,18 +181,22 @@ impl Mesh {
         own + (start + slope) * scale(inside)
     }
 
-    /// A place in the free part of a cell: its centroid or the integration point nearest to it.
-    pub fn free_place(&self, cell: usize, part: &Part) -> Point {
+    /// A place in the free part of a cell: its centroid or the integration point nearest to it; `None` if
+    /// no such point is free, as in a sliver.
+    pub fn free_place(&self, cell: usize, part: &Part) -> Option<Point> {
         let centroid = part.centroid();
-        let is_free = |r: Point| !self.is_solid_in(cell, self.from_reference(cell, r));
+        let is_free = |r: Point| {
+            let p = self.from_reference(cell, r);
+            !self.is_solid_in(cell, p) && self.locate(p) == cell
+        };
         if is_free(centroid) {
-            return self.from_reference(cell, centroid);
+            return Some(self.from_reference(cell, centroid));
         }
         let away = |r: Point| (r[0] - centroid[0]).hypot(r[1] - centroid[1]);
         let points = part.points.iter().filter(|p| p.weight > 0.0).map(|p| p.r);
         let free = points.filter(|&r| is_free(r));
         let nearest = free.min_by(|&a, &b| away(a).total_cmp(&away(b)));
-        self.from_reference(cell, nearest.unwrap_or(centroid))
+        Some(self.from_reference(cell, nearest?))
     }
 
     /// Whether two neighbours share a face.

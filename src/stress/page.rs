@@ -1,7 +1,7 @@
 //! Formats the outcomes of the stress battery as a table, a documentation page and JSON.
 
 use super::{Outcome, Verdict};
-use crate::sim::criteria::{CRITERIA, FLOW_CURVES};
+use crate::sim::criteria::{CRITERIA, Criteria, FLOW_CURVES};
 use crate::verify::{Table, number};
 use serde::Serialize;
 
@@ -77,8 +77,10 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
 pub fn json(outcomes: &[Outcome]) -> serde_json::Result<String> {
     #[derive(Serialize)]
     struct All<'a> {
-        criteria: &'a crate::sim::criteria::Criteria,
+        /// Those of every trial but those of flow curves.
+        criteria: &'a Criteria,
+        flow_curves: &'a Criteria,
         outcomes: &'a [Outcome],
     }
-    serde_json::to_string_pretty(&All { criteria: &CRITERIA, outcomes })
+    serde_json::to_string_pretty(&All { criteria: &CRITERIA, flow_curves: &FLOW_CURVES, outcomes })
 }

@@ -4,8 +4,10 @@ use super::{Case, List, PlotSpec, State, Store, SweepError};
 use crate::record::number::short;
 use crate::record::plots::{Axis, Curve, PlotError, PlotSpec as Plot, spread_plot};
 use crate::record::replace::{self, Kind};
+use crate::scene::Geometry;
 use crate::sim::row::find;
 use indexmap::IndexMap;
+use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -60,6 +62,8 @@ pub struct Collection {
     pub groups: Vec<Group>,
     /// Names of the result columns, in the order of display.
     pub columns: Vec<String>,
+    /// Geometry of the runs, on which units depend.
+    pub geometry: Geometry,
 }
 
 impl Spread {
@@ -81,10 +85,15 @@ impl Collection {
     /// Reads the results of all cases.
     pub fn new(store: &Store, list: &List) -> Result<Collection, SweepError> {
         let mut entries = vec![];
+        let mut geometry = Geometry::Plane;
         for case in &list.cases {
             let state = store.state(&case.id);
             let found = match state {
-                State::Done => results(store, &case.id)?,
+                State::Done => {
+                    let summary = summary(store, &case.id)?;
+                    geometry = Geometry::deserialize(&summary["geometry"]).unwrap_or(geometry);
+                    results(store, &case.id, &summary)
+                }
                 _ => IndexMap::new(),
             };
             entries.push(Entry { case: case.clone(), state, found });
@@ -96,7 +105,7 @@ impl Collection {
             }
         }
         let groups = groups(&entries);
-        Ok(Collection { parameters: list.parameters.clone(), entries, groups, columns })
+        Ok(Collection { parameters: list.parameters.clone(), entries, groups, columns, geometry })
     }
 
     /// Number of finished cases.
@@ -219,7 +228,7 @@ impl Collection {
         });
         let curves = curves.collect();
         let axis = |name: &str, log: bool| {
-            let axis = Axis::new(name.replace('_', " "), unit(name));
+            let axis = Axis::new(name.replace('_', " "), self.geometry.unit(unit(name)));
             if log { axis.log() } else { axis }
         };
         let seeds = self.groups.iter().map(|g| g.runs).max().unwrap_or(0);
@@ -295,12 +304,16 @@ fn groups(entries: &[Entry]) -> Vec<Group> {
     members.into_values().map(group).collect()
 }
 
-/// Results of a finished case, by the column names of the series and of comparisons.
-fn results(store: &Store, id: &str) -> Result<IndexMap<String, f64>, SweepError> {
+/// Summary of a finished case.
+fn summary(store: &Store, id: &str) -> Result<Value, SweepError> {
     let path = store.done(id).join("summary.json");
     let text = std::fs::read_to_string(&path).map_err(SweepError::file("read", &path))?;
-    let summary: Value = serde_json::from_str(&text)
-        .map_err(|e| SweepError::Broken { path, cause: format!("is not a summary: {e}") })?;
+    serde_json::from_str(&text)
+        .map_err(|e| SweepError::Broken { path, cause: format!("is not a summary: {e}") })
+}
+
+/// Results of a finished case, by the column names of the series and of comparisons.
+fn results(store: &Store, id: &str, summary: &Value) -> IndexMap<String, f64> {
     let mut found = IndexMap::new();
     let mut put = |name: String, value: Option<f64>| found.extend(value.map(|v| (name, v)));
     let time = summary["time"].as_f64();
@@ -343,7 +356,7 @@ fn results(store: &Store, id: &str) -> Result<IndexMap<String, f64>, SweepError>
     put("seconds_per_step".into(), per_step);
     put("recording_bytes".into(), recording);
     put("frames".into(), frames);
-    Ok(found)
+    found
 }
 
 fn unit(name: &str) -> &'static str {

@@ -3,12 +3,16 @@
 use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number, rate};
 use crate::cases::solids::{
-    ARRAY_DRAG, LowerWall, SlantedChannel, array_drag, slanted_channel, slipping_circle, wedge,
+    ARRAY_DRAG, LowerWall, SlantedChannel, array_drag, slanted_channel, slanted_cosserat,
+    slipping_circle, wedge,
 };
-use crate::cases::{Case, CaseError};
+use crate::cases::{Case, CaseError, Fluid};
 
 /// Numbers of cells per side.
 const CELLS: [u32; 4] = [16, 32, 64, 128];
+
+/// The Cosserat fluid; its internal length is a fifth of the width of its channel.
+const COSSERAT: Fluid = Fluid { shear: 1.0, coupling: 1.0, internal_length: 0.05 };
 
 /// Verifies solids of any shape.
 pub fn section(effort: Effort) -> Result<Section, CaseError> {
@@ -35,13 +39,15 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     );
     use LowerWall::{FreeSlip, Friction, NoSlip, Slip};
     let channel = |degrees, lower| slanted_channel(SlantedChannel { degrees, width: 0.25, lower });
-    let list: [(&str, Case); 10] = [
+    let list: [(&str, Case); 12] = [
         ("channel at 30 degrees", channel(30.0, NoSlip)),
         ("channel at 12 degrees, lower wall slips", channel(12.0, FreeSlip)),
         ("channel at 30 degrees, lower wall slips", channel(30.0, FreeSlip)),
         ("channel at 12 degrees, slip length 0.1", channel(12.0, Slip(0.1))),
         ("channel at 30 degrees, slip length 0.1", channel(30.0, Slip(0.1))),
         ("channel at 30 degrees, wall friction", channel(30.0, Friction(0.4, 0.2))),
+        ("Cosserat channel at 12 degrees", slanted_cosserat(COSSERAT, 12.0, 0.25)),
+        ("Cosserat channel at 30 degrees", slanted_cosserat(COSSERAT, 30.0, 0.25)),
         ("circle, slip length 0.1", slipping_circle(0.1)),
         ("circle, slip length 0.01", slipping_circle(0.01)),
         ("wedge of 20 degrees", wedge(20.0)),

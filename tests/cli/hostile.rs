@@ -338,11 +338,11 @@ fn recordings() {
     let run = ["run", "couette_cosserat", "--set", "accuracy.cells=4", "--steps", "2"];
     here.grainscope(&[&run[..], &["--out", "run"]].concat()).exits(0);
     let good = std::fs::read(here.path("run/recording.rrd")).expect("a recording");
-    // In an uncompressed recording, changes also affect the data itself.
+    // In an uncompressed recording, changes also affect the data itself. One input takes a tenth of a second.
     let corpus = [uncompressed(&good), good];
     let path = here.path("x.rrd");
     let (mut refused, mut taken) = (0, 0);
-    let count = inputs(0.03, |random, k| {
+    let count = inputs(0.01, |random, k| {
         let good = corpus.choose(random).expect("two");
         let bytes = mutated_bytes(random, good);
         std::fs::write(&path, &bytes).expect("written");

@@ -477,3 +477,28 @@ fn a_turned_slump_is_the_same() {
         assert!((a.0 / b.0 - 1.0).abs() < 1e-6 && (a.1 / b.1 - 1.0).abs() < 1e-6, "{a:?} {b:?}");
     }
 }
+
+#[test]
+fn a_slanted_gauge_counts_what_an_upright_one_counts() {
+    // Mud below water between plates, driven by the upper one; the gauges reach from plate to plate.
+    let text = "schema = 1\nname = \"layers\"\n[domain]\nx = [0, 2]\ny = [0, 1]\n[accuracy]\ncells = 12\n\
+        [time]\nend = 2\n[materials.mud]\nshear_viscosity = 3\n[materials.water]\nshear_viscosity = 1\n\
+        [[regions]]\nmaterial = \"water\"\n[[regions]]\nmaterial = \"mud\"\nshape.rectangle.x = [0, 2]\n\
+        shape.rectangle.y = [0, 0.6]\n[boundaries]\nleft.kind = \"periodic\"\nright.kind = \"periodic\"\n\
+        bottom.kind = \"no_slip\"\ntop = { kind = \"no_slip\", velocity_x = 1 }\n\
+        [[gauges]]\nname = \"upright\"\nfrom = [1, 0]\nto = [1, 1]\ndirection = \"right\"\nmaterial = \"mud\"\n\
+        [[gauges]]\nname = \"slanted\"\nfrom = [0.43, 0]\nto = [1.21, 1]\ndirection = \"right\"\nmaterial = \"mud\"\n\
+        [[gauges]]\nname = \"back\"\nfrom = [1.93, 0]\nto = [0.12, 1]\ndirection = \"left\"\nmaterial = \"mud\"\n\
+        [[gauges]]\nname = \"up\"\nfrom = [0.43, 0]\nto = [1.21, 1]\ndirection = \"up\"\nmaterial = \"mud\"\n";
+    let mut run = scene(text, &[]);
+    crate::finish(run.as_mut(), |_| {});
+    // The shear rate of the mud is a third of that of the water.
+    let top = 1.0 / (0.6 / 3.0 + 0.4);
+    let exact = 0.5 * 0.6 * 0.6 * top / 3.0;
+    let row = run.row();
+    for (gauge, sign) in row.gauges.iter().zip([1.0, 1.0, -1.0, -1.0]) {
+        assert!((gauge.rate * sign / exact - 1.0).abs() < 0.01, "{} {exact}", gauge.rate);
+        let volume = exact * row.time;
+        assert!((gauge.volume * sign / volume - 1.0).abs() < 0.02, "{} {volume}", gauge.volume);
+    }
+}

@@ -4,9 +4,8 @@ use super::super::knobs::{self, Stop, Switch};
 use super::super::live::Live;
 use super::super::protocol::{DialState, Light, Reading, RunState, State, SwitchState};
 use super::*;
-use crate::scene::Geometry;
 use crate::sim::clock::Limiter;
-use crate::sim::criteria::{ACCURATE_ENERGY, CRITERIA, ENERGY_STEPS};
+use crate::sim::criteria::{ACCURATE_ENERGY, Criteria, ENERGY_STEPS};
 use std::time::Instant;
 
 pub(super) fn milliseconds(seconds: f64) -> String {
@@ -42,7 +41,7 @@ pub(super) fn run_state(live: &Live) -> RunState {
         seconds_per_step: live.usual_step(),
         particles: row.particles,
         cells: [plan.mesh.x.cells(), plan.mesh.y.cells()],
-        round: plan.scene.domain.geometry == Geometry::Axisymmetric,
+        round: plan.scene.domain.geometry.is_round(),
         unknowns: knobs::unknowns(plan),
         lights: lights(live),
         readings,
@@ -64,12 +63,13 @@ pub(super) fn lights(live: &Live) -> Vec<Light> {
         meaning,
     };
     // The divergence error grows with the tolerance of the solver.
-    let divergence = CRITERIA.divergence.max(10.0 * live.drive.plan.method.tolerance);
+    let criteria = Criteria::of(&live.drive.plan);
+    let divergence = criteria.divergence.max(10.0 * live.drive.plan.method.tolerance);
     vec![
         light(
             "power balance",
             row.power_error,
-            CRITERIA.power,
+            criteria.power,
             "relative difference of the power of all loads and the dissipation",
         ),
         light(
@@ -87,13 +87,13 @@ pub(super) fn lights(live: &Live) -> Vec<Light> {
         light(
             "volume error",
             drift,
-            CRITERIA.drift,
+            criteria.drift,
             "largest relative change of a material's projected area since the start",
         ),
         light(
             "corrections",
             f64::from(row.iterations),
-            CRITERIA.corrections,
+            criteria.corrections,
             "corrections of the solver in this step",
         ),
     ]

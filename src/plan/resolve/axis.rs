@@ -2,16 +2,16 @@
 
 use super::values::Result;
 use crate::plan::boundary::Side;
-use crate::scene::{BoundaryKind, FieldFn, Geometry, Scene, SceneError, Scope};
+use crate::scene::{BoundaryKind, FieldFn, Scene, SceneError, Scope};
 
 /// Whether the left side of the domain is the axis.
 pub(super) fn is_axis(scene: &Scene, x: [f64; 2]) -> bool {
-    scene.domain.geometry == Geometry::Axisymmetric && x[0] == 0.0
+    scene.domain.geometry.is_round() && x[0] == 0.0
 }
 
 /// Refuses what an axisymmetric flow cannot have. `x`: range of the radius, m.
 pub(super) fn check(scene: &Scene, x: [f64; 2], gravity: [f64; 2]) -> Result<()> {
-    if scene.domain.geometry == Geometry::Plane {
+    if !scene.domain.geometry.is_round() {
         return Ok(());
     }
     if x[0] < 0.0 {
@@ -58,7 +58,7 @@ pub(super) fn check_moving(scene: &Scene, scope: &Scope) -> Result<()> {
     for block in &scene.blocks {
         let Some([x, _]) = &block.velocity else { continue };
         let rests = matches!(x.in_time(scope)?, FieldFn::Constant(v) if v == 0.0);
-        if scene.domain.geometry == Geometry::Axisymmetric && !rests {
+        if scene.domain.geometry.is_round() && !rests {
             return Err(SceneError::at(
                 x,
                 format!("block `{}` moves along the radius", block.name),

@@ -2,32 +2,40 @@
 
 use super::materials::material_index;
 use super::values::Result;
-use super::walls::axis_segment;
+use super::walls::line;
 use crate::plan::{Gauge, Units};
 use crate::scene::{self, Direction, Interesting, Moment, Scene, SceneError, Scope, closest};
 use crate::space::mesh::Mesh;
-use crate::space::segment::Segment;
+use crate::space::segment::Line;
 
 /// A gauge in SI coordinates.
 pub(super) struct SiGauge {
     pub(super) name: String,
-    pub(super) segment: Segment,
+    pub(super) line: Line,
     direction: Direction,
     material: u8,
 }
 
 impl SiGauge {
-    /// The gauge in the plan's units, moved to the nearest mesh lines.
+    /// The gauge in the plan's units, moved to the nearest mesh lines if it is along them.
     pub(super) fn scaled(self, mesh: &Mesh, units: &Units) -> Gauge {
         Gauge {
             name: self.name,
-            segment: self.segment.on_mesh(mesh, units.length),
-            sign: match self.direction {
-                Direction::Right | Direction::Up => 1.0,
-                Direction::Left | Direction::Down => -1.0,
-            },
+            line: self.line.on_mesh(mesh, units.length),
+            sign: along(self.direction, &self.line).signum(),
             material: self.material,
         }
+    }
+}
+
+/// Component of the normal of a line along a direction.
+fn along(direction: Direction, line: &Line) -> f64 {
+    let [x, y] = line.normal();
+    match direction {
+        Direction::Right => x,
+        Direction::Left => -x,
+        Direction::Up => y,
+        Direction::Down => -y,
     }
 }
 
@@ -79,17 +87,17 @@ fn flow(
     let to = g.to.as_ref().ok_or_else(|| missing("to"))?;
     let direction = g.direction.ok_or_else(|| missing("direction"))?;
     let name = g.material.as_ref().ok_or_else(|| missing("material"))?;
-    let segment = axis_segment(what, from, to, scope, domain)?;
-    let wanted = usize::from(matches!(direction, Direction::Up | Direction::Down));
-    if segment.normal != wanted {
+    let line = line(what, from, to, scope, domain)?;
+    if along(direction, &line) == 0.0 {
         return Err(SceneError::at(
             &from[0],
             format!("{what}: its direction runs along the segment"),
-            "a horizontal gauge counts `up` or `down`, a vertical one `left` or `right`",
+            "a horizontal gauge counts `up` or `down`, a vertical one `left` or `right`, a slanted one \
+             any of these",
         ));
     }
     let material = material_index(&scene.materials, name, what, &format!("gauges[{k}].material"))?;
-    Ok(SiGauge { name: g.name.clone(), segment, direction, material })
+    Ok(SiGauge { name: g.name.clone(), line, direction, material })
 }
 
 /// What carries the force of a gauge.

@@ -78,7 +78,7 @@ pub(super) fn mesh(
     }
     for g in gauges {
         let owner = format!("gauge `{}`", g.name);
-        g.segment.lines().into_iter().for_each(|(c, v)| demand(c, v, &owner, false));
+        g.line.mesh_lines().for_each(|(c, v)| demand(c, v, &owner, false));
     }
     for (s, piece) in pieces(sides).filter(|(_, piece)| piece.part.is_some()) {
         let Segment { normal, from, to, .. } = piece.segment;

@@ -4,7 +4,7 @@ use super::materials::SiMatter;
 use super::values::{Result, edge, finite_range, middle};
 use crate::plan::Units;
 use crate::plan::units::power_of_two;
-use crate::scene::{Field, Geometry, Scene, Scope};
+use crate::scene::{Field, Scene, Scope};
 
 /// Units of length, viscosity, time and density, from the values in the scene.
 pub(super) fn choose_units(
@@ -65,6 +65,6 @@ pub(super) fn choose_units(
         viscosity: power_of_two(viscosity),
         time: power_of_two(time),
         density: power_of_two(density),
-        depth: if scene.domain.geometry == Geometry::Plane { 1.0 } else { length },
+        depth: if scene.domain.geometry.is_round() { length } else { 1.0 },
     })
 }

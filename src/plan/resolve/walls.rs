@@ -8,7 +8,7 @@ use crate::plan::{BoundaryPlan, Moving, Pose, Units};
 use crate::scene::{Block, Quantity, Scene, SceneError, Scope, SolidShape, Wall, WallKind};
 use crate::space::mesh::Mesh;
 use crate::space::outline::Outline;
-use crate::space::segment::Segment;
+use crate::space::segment::{Line, Segment};
 use crate::space::walls::Enclosure;
 
 /// Walls and blocks in SI coordinates.
@@ -64,8 +64,27 @@ pub(in crate::plan) fn axis_segment(
     from: &[Quantity; 2],
     to: &[Quantity; 2],
     scope: &Scope,
-    [x, y]: [[f64; 2]; 2],
+    domain: [[f64; 2]; 2],
 ) -> Result<Segment> {
+    match line(what, from, to, scope, domain)? {
+        Line::Aligned(segment) => Ok(segment),
+        Line::Slanted([a, b]) => Err(SceneError::at(
+            &to[0],
+            format!("{what} is slanted: from ({}, {}) to ({}, {})", a[0], a[1], b[0], b[1]),
+            "thin walls and nozzles follow mesh lines: make both x or both y equal, or give a wall a \
+             thickness, as in thickness = 0.05",
+        )),
+    }
+}
+
+/// The line between two points, or an error if it has no length or leaves the domain.
+pub(in crate::plan) fn line(
+    what: &str,
+    from: &[Quantity; 2],
+    to: &[Quantity; 2],
+    scope: &Scope,
+    [x, y]: [[f64; 2]; 2],
+) -> Result<Line> {
     let (a, b) = (point(from, scope)?, point(to, scope)?);
     let size = (x[1] - x[0]).max(y[1] - y[0]);
     let tiny = 1e-9 * size;
@@ -80,12 +99,7 @@ pub(in crate::plan) fn axis_segment(
     }
     let (dx, dy) = ((a[0] - b[0]).abs(), (a[1] - b[1]).abs());
     if dx > tiny && dy > tiny {
-        return Err(SceneError::at(
-            &to[0],
-            format!("{what} is slanted: from ({}, {}) to ({}, {})", a[0], a[1], b[0], b[1]),
-            "walls and gauges follow mesh lines: make both x or both y equal, or give a wall a \
-             thickness, as in thickness = 0.05",
-        ));
+        return Ok(Line::Slanted([a, b]));
     }
     if dx <= tiny && dy <= tiny {
         return Err(SceneError::at(
@@ -96,7 +110,7 @@ pub(in crate::plan) fn axis_segment(
     }
     let normal = usize::from(dx > dy);
     let (s, t) = (a[1 - normal], b[1 - normal]);
-    Ok(Segment { normal, at: a[normal], from: s.min(t), to: s.max(t) })
+    Ok(Line::Aligned(Segment { normal, at: a[normal], from: s.min(t), to: s.max(t) }))
 }
 
 impl Walls {

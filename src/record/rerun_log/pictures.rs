@@ -21,6 +21,20 @@ pub(super) fn expect_length(what: &str, found: usize, expected: usize) -> Result
     }
 }
 
+/// Colour of a value.
+pub(super) fn on_scale(scale: ColourScale, value: f32) -> Color {
+    let [r, g, b, a] = scale.color(value);
+    Color::from_unmultiplied_rgba(r, g, b, a)
+}
+
+/// What changed in the look of the particles since the last picture. No colours: those of the classes.
+#[derive(Default)]
+pub(super) struct Look {
+    pub(super) classes: Option<Vec<u16>>,
+    pub(super) radii: Option<Vec<Radius>>,
+    pub(super) colours: Option<Vec<Color>>,
+}
+
 impl RerunLog {
     pub(super) fn scalar(&self, scalar: &Scalar) -> Result<(), RecordError> {
         self.rec.log(self.paths.at(&scalar.path), &archetypes::Scalars::single(scalar.value))?;
@@ -37,9 +51,9 @@ impl RerunLog {
     }
 
     pub(super) fn snapshot(&mut self, snapshot: &Snapshot) -> Result<(), RecordError> {
-        self.particles(&snapshot.particles)?;
+        let look = self.particles(&snapshot.particles)?;
         if self.round {
-            self.round_picture(&snapshot.particles, &snapshot.dye_lines)?;
+            self.round_picture(snapshot, &look)?;
         }
         self.rec.log(
             self.paths.at("world/dye"),
@@ -85,42 +99,51 @@ impl RerunLog {
         self.lines(&snapshot.isolines)
     }
 
-    pub(super) fn particles(&mut self, particles: &ParticleSnapshot) -> Result<(), RecordError> {
-        let path = self.paths.at("world/particles");
-        let count = particles.positions.len();
-        expect_length("particle classes", particles.class.len(), count)?;
+    pub(super) fn particles(&mut self, particles: &ParticleSnapshot) -> Result<Look, RecordError> {
+        let look = self.look(particles)?;
         let mut points = archetypes::Points2D::update_fields()
             .with_positions(particles.positions.iter().copied());
-        self.round_changed = self.classes != particles.class;
+        if let Some(classes) = &look.classes {
+            points = points.with_class_ids(classes.iter().copied());
+        }
+        if let Some(radii) = &look.radii {
+            points = points.with_radii(radii.iter().copied());
+        }
+        if let Some(colours) = &look.colours {
+            points = points.with_colors(colours.iter().copied());
+        }
+        self.rec.log(self.paths.at("world/particles"), &points)?;
+        Ok(look)
+    }
+
+    /// What changed in the look of the particles since the last picture; records the colour bar.
+    fn look(&mut self, particles: &ParticleSnapshot) -> Result<Look, RecordError> {
+        let count = particles.positions.len();
+        expect_length("particle classes", particles.class.len(), count)?;
+        let mut look = Look::default();
         if self.classes != particles.class {
             self.classes.clone_from(&particles.class);
-            points = points.with_class_ids(particles.class.iter().copied());
+            look.classes = Some(particles.class.clone());
         }
         // Old recordings have no radii of their own.
         let usual = [self.particle_radius];
         let radii = if particles.radii.is_empty() { &usual[..] } else { &particles.radii };
-        self.round_changed |= self.radii != radii;
         if self.radii != radii {
             self.radii = radii.to_vec();
-            let radius = |&radius: &f32| Radius::new_scene_units(radius);
-            points = points.with_radii(radii.iter().map(radius));
+            look.radii = Some(radii.iter().map(|&r| Radius::new_scene_units(r)).collect());
         }
         if let Some(scalar) = &particles.scalar {
             expect_length("particle values", scalar.values.len(), count)?;
             let signed = self.particle_quantity.as_ref().is_some_and(|q| q.signed);
             let scale = ColourScale::new(scalar.range, signed);
-            points = points.with_colors(scalar.values.iter().map(|&value| {
-                let [r, g, b, a] = scale.color(value);
-                Color::from_unmultiplied_rgba(r, g, b, a)
-            }));
+            look.colours = Some(scalar.values.iter().map(|&v| on_scale(scale, v)).collect());
             self.scale_bar(&self.paths.at("world/scale"), scale)?;
             self.colored = true;
         } else if self.colored {
-            points = points.with_colors(std::iter::empty::<Color>());
+            look.colours = Some(vec![]);
             self.colored = false;
         }
-        self.rec.log(path, &points)?;
-        Ok(())
+        Ok(look)
     }
 
     pub(super) fn field(&mut self, field: &GridField) -> Result<(), RecordError> {

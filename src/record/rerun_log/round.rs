@@ -1,5 +1,6 @@
 //! Writes the three-dimensional view of a round flow: the section in the plane of the mesh on both faces
-//! of a wedge that is left open, with walls and dyed lines swept around the axis in between.
+//! of a wedge that is left open, with walls, dyed lines and rings of rotation swept around the axis in
+//! between.
 //!
 //! ```text
 //! point (x, y) at the azimuth f:   (x cos f, y, -x sin f),   f = 0 to 270 degrees
@@ -7,8 +8,9 @@
 //! Particles are those of the flat view. Dyed lines become surfaces of few points; their triangles are
 //! recorded again only when the number of lines changes.
 
+use super::pictures::{Look, on_scale};
 use super::*;
-use crate::frame::{Outline, ParticleSnapshot};
+use crate::frame::{Outline, Ring, Snapshot};
 use crate::plan::boundary::SIDES;
 use rerun::archetypes;
 use rerun::components::Radius;
@@ -21,6 +23,8 @@ const WALL_STEPS: usize = 37;
 const DYE_STEPS: usize = 13;
 /// Number of points of a dyed line that are swept.
 const DYE_POINTS: usize = 12;
+/// Radius of the ring of the largest rotation, as a share of the longer side of the domain.
+const RING: f32 = 0.008;
 /// Colour of swept walls, with its opacity.
 const SWEPT_WALL: [u8; 4] = [120, 124, 132, 255];
 /// Colour of swept dyed lines.
@@ -102,26 +106,31 @@ impl RerunLog {
         Ok(())
     }
 
-    /// Records the particles on both faces, and the dyed surfaces.
+    /// Records the particles on both faces, the dyed surfaces, and the rings of rotation.
     pub(super) fn round_picture(
         &mut self,
-        particles: &ParticleSnapshot,
-        dye: &[Vec<[f32; 2]>],
+        snapshot: &Snapshot,
+        look: &Look,
     ) -> Result<(), RecordError> {
-        let faces = [0.0, SWEPT];
-        let usual = [self.particle_radius];
-        let radii = if particles.radii.is_empty() { &usual[..] } else { &particles.radii };
-        let radius = |&radius: &f32| Radius::new_scene_units(radius);
-        for (name, azimuth) in ["round/first", "round/second"].into_iter().zip(faces) {
-            let places = particles.positions.iter().map(|&p| turned(p, azimuth));
+        for (name, azimuth) in ["round/first", "round/second"].into_iter().zip([0.0, SWEPT]) {
+            let places = snapshot.particles.positions.iter().map(|&p| turned(p, azimuth));
             let mut points = archetypes::Points3D::update_fields().with_positions(places);
-            if self.round_changed {
-                points = points
-                    .with_class_ids(particles.class.iter().copied())
-                    .with_radii(radii.iter().map(radius));
+            if let Some(classes) = &look.classes {
+                points = points.with_class_ids(classes.iter().copied());
+            }
+            if let Some(radii) = &look.radii {
+                points = points.with_radii(radii.iter().copied());
+            }
+            if let Some(colours) = &look.colours {
+                points = points.with_colors(colours.iter().copied());
             }
             self.rec.log(self.paths.at(name), &points)?;
         }
+        self.round_dye(&snapshot.dye_lines)?;
+        self.round_rotation(&snapshot.rings)
+    }
+
+    fn round_dye(&mut self, dye: &[Vec<[f32; 2]>]) -> Result<(), RecordError> {
         let lines: Vec<Vec<[f32; 2]>> = dye.iter().map(|line| few(line)).collect();
         if lines.is_empty() && self.round_lines == 0 {
             return Ok(());
@@ -135,6 +144,30 @@ impl RerunLog {
                 .with_albedo_factor(colour(SWEPT_DYE));
         }
         self.rec.log(self.paths.at("round/dye"), &mesh)?;
+        Ok(())
+    }
+
+    /// Records the rotation as rings about the axis. Rotation is about the direction of a ring; its colour
+    /// shows the sign, its thickness the magnitude.
+    fn round_rotation(&mut self, rings: &[Ring]) -> Result<(), RecordError> {
+        if rings.is_empty() && self.round_rings.is_empty() {
+            return Ok(());
+        }
+        let largest = rings.iter().map(|r| r.rotation.abs()).fold(0.0, f32::max);
+        let scale = ColourScale::new([-largest, largest], true);
+        let thickest = RING * self.domain.size().into_iter().fold(0.0, f32::max);
+        let share = |r: &Ring| if largest > 0.0 { r.rotation.abs() / largest } else { 0.0 };
+        let mut lines = archetypes::LineStrips3D::update_fields()
+            .with_colors(rings.iter().map(|r| on_scale(scale, r.rotation)))
+            .with_radii(rings.iter().map(|r| Radius::new_scene_units(thickest * share(r))));
+        let places: Vec<[f32; 2]> = rings.iter().map(|r| r.at).collect();
+        if self.round_rings != places {
+            let ring = |&at: &[f32; 2]| azimuths(WALL_STEPS).map(move |f| turned(at, f));
+            let strips = places.iter().map(|at| ring(at).collect::<Vec<_>>());
+            lines = lines.with_strips(strips);
+            self.round_rings = places;
+        }
+        self.rec.log(self.paths.at("round/rings"), &lines)?;
         Ok(())
     }
 }
