@@ -28,7 +28,7 @@ const FIELD_SAMPLES: f64 = 240.0;
 /// Number of arrows along the longer side of the domain.
 const ARROWS: f64 = 28.0;
 /// Number of rings of rotation along the longer side of the domain.
-const RINGS: f64 = 16.0;
+const RINGS: f64 = 12.0;
 /// Levels of mean |n_x| that are drawn; the first is near 2/pi, the mean of random directors.
 const ALIGNMENT_LEVELS: [f32; 6] = [0.6, 0.5, 0.4, 0.3, 0.2, 0.1];
 

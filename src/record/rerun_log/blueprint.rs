@@ -129,7 +129,7 @@ impl Writer<'_> {
         let flow = self.flow(info, paths)?;
         let mut reading = vec![flow];
         if info.round {
-            reading.insert(0, self.round(paths)?);
+            reading.insert(0, self.round(info, paths)?);
         }
         reading.push(self.text("Plan", &paths.at("plan"))?);
         reading.push(self.text("Scene", &paths.at("scene"))?);
@@ -179,7 +179,7 @@ impl Writer<'_> {
             let flow = if alone { self.flow(info, &paths)? } else { self.lane(info, &paths)? };
             let mut fields = self.fields(info, &paths)?;
             if info.round {
-                fields.insert(0, self.round(&paths)?);
+                fields.insert(0, self.round(info, &paths)?);
             }
             if alone {
                 fields.push(self.text("Plan", &paths.at("plan"))?);

@@ -1,6 +1,6 @@
 //! Writes the three-dimensional view of a round flow: the section in the plane of the mesh on both faces
-//! of a wedge that is left open, with walls, dyed lines and rings of rotation swept around the axis in
-//! between.
+//! of a wedge that is left open, with walls and dyed lines swept around the axis in between, and rings of
+//! rotation all around it.
 //!
 //! ```text
 //! point (x, y) at the azimuth f:   (x cos f, y, -x sin f),   f = 0 to 270 degrees
@@ -14,21 +14,24 @@ use crate::frame::{Outline, Ring, Snapshot};
 use crate::plan::boundary::SIDES;
 use rerun::archetypes;
 use rerun::components::Radius;
+use std::f32::consts::TAU;
 
 /// Angle that is swept, rad.
 const SWEPT: f32 = 1.5 * std::f32::consts::PI;
 /// Number of azimuths of a swept wall.
 const WALL_STEPS: usize = 37;
+/// Number of azimuths of a ring.
+const RING_STEPS: usize = 49;
 /// Number of azimuths of a swept dyed line.
 const DYE_STEPS: usize = 13;
 /// Number of points of a dyed line that are swept.
 const DYE_POINTS: usize = 12;
 /// Radius of the ring of the largest rotation, as a share of the longer side of the domain.
-const RING: f32 = 0.008;
+const RING: f32 = 0.005;
 /// Colour of swept walls, with its opacity.
-const SWEPT_WALL: [u8; 4] = [120, 124, 132, 255];
-/// Colour of swept dyed lines.
-const SWEPT_DYE: [u8; 4] = [60, 70, 90, 255];
+const SWEPT_WALL: [u8; 4] = [120, 124, 132, 110];
+/// Colour of swept dyed lines, with its opacity.
+const SWEPT_DYE: [u8; 4] = [60, 70, 90, 120];
 
 /// A point at an azimuth.
 fn turned([x, y]: [f32; 2], azimuth: f32) -> [f32; 3] {
@@ -36,15 +39,15 @@ fn turned([x, y]: [f32; 2], azimuth: f32) -> [f32; 3] {
     [x * c, y, -x * s]
 }
 
-/// Azimuths of `steps` copies of a line.
-fn azimuths(steps: usize) -> impl Iterator<Item = f32> + Clone {
-    (0..steps).map(move |k| SWEPT * k as f32 / (steps - 1) as f32)
+/// Azimuths of `steps` copies of a line, from 0 to an angle.
+fn azimuths(angle: f32, steps: usize) -> impl Iterator<Item = f32> + Clone {
+    (0..steps).map(move |k| angle * k as f32 / (steps - 1) as f32)
 }
 
 /// Points of swept lines, azimuth by azimuth for each line.
 fn swept(lines: &[Vec<[f32; 2]>], steps: usize) -> Vec<[f32; 3]> {
     let of = |line: &Vec<[f32; 2]>| -> Vec<[f32; 3]> {
-        azimuths(steps).flat_map(|f| line.iter().map(move |&p| turned(p, f))).collect()
+        azimuths(SWEPT, steps).flat_map(|f| line.iter().map(move |&p| turned(p, f))).collect()
     };
     lines.iter().flat_map(of).collect()
 }
@@ -162,7 +165,7 @@ impl RerunLog {
             .with_radii(rings.iter().map(|r| Radius::new_scene_units(thickest * share(r))));
         let places: Vec<[f32; 2]> = rings.iter().map(|r| r.at).collect();
         if self.round_rings != places {
-            let ring = |&at: &[f32; 2]| azimuths(WALL_STEPS).map(move |f| turned(at, f));
+            let ring = |&at: &[f32; 2]| azimuths(TAU, RING_STEPS).map(move |f| turned(at, f));
             let strips = places.iter().map(|at| ring(at).collect::<Vec<_>>());
             lines = lines.with_strips(strips);
             self.round_rings = places;

@@ -9,6 +9,11 @@ use rerun::components::Color;
 use rerun::datatypes::{Range1D, Range2D};
 use rerun::external::re_sdk_types::blueprint::{archetypes, components};
 
+/// Distance of the eye from the middle of a round flow, over the size of the flow.
+const EYE_DISTANCE: f32 = 1.5;
+/// Height of the eye above the middle, over its distance.
+const EYE_HEIGHT: f32 = 0.35;
+
 /// A view or container that was written.
 #[derive(Clone)]
 pub(super) struct Node {
@@ -43,10 +48,21 @@ impl Writer<'_> {
         self.space(&title, paths, &FLOW, colour_bar::seen(info.domain, colour_bar::Room::Large))
     }
 
-    /// The view of a round flow in three dimensions.
-    pub(super) fn round(&mut self, paths: &Paths) -> Result<Node, RecordError> {
+    /// The view of a round flow in three dimensions, into the wedge that is left open.
+    pub(super) fn round(&mut self, info: &RunInfo, paths: &Paths) -> Result<Node, RecordError> {
         let node = self.view("3D", "Round", &paths.at("round").to_string(), &["+ $origin/**"])?;
         self.on_paper(&node)?;
+        let [radius, height] = info.domain.size();
+        let middle = 0.5 * (info.domain.min[1] + info.domain.max[1]);
+        let far = EYE_DISTANCE * height.max(2.0 * radius);
+        let side = far * std::f32::consts::FRAC_1_SQRT_2;
+        self.property(
+            &node,
+            "EyeControls3D",
+            &archetypes::EyeControls3D::new()
+                .with_position([side, middle + EYE_HEIGHT * far, side])
+                .with_look_target([0.0, middle, 0.0]),
+        )?;
         Ok(node)
     }
 
