@@ -133,6 +133,9 @@ fn main() -> Outcome<()> {
            [[regions]]\nmaterial = \"fluid\"\nshape.rectangle = { x = [0, 1], y = [0, 0.51] }\n";
     let named = LID.to_string() + "[materials.rest]\nshear_viscosity = 1\nbackground = true\n";
 
+    let round_silo = include_str!("../presets/round_silo.toml");
+    let flat_silo = round_silo.replace("geometry = \"axisymmetric\"\n", "");
+
     println!("step with, step without (processor time, medians of {STEPS}), ratio");
     removed("silo", &[], EffectKind::Rotation, "Cosserat rotation (silo)")?;
     removed("shear_alignment", &[], EffectKind::Directors, "directors (shear_alignment)")?;
@@ -141,6 +144,7 @@ fn main() -> Outcome<()> {
     removed("silo", &[], EffectKind::Gauges, "gauges (silo)")?;
     removed("silo", &[], EffectKind::Stabilisation, "stabilised stratification (silo)")?;
     against((LID, &["gravity[1]=-10"]), (LID, &[]), "gravity (lid)")?;
+    against((round_silo, &[]), (&flat_silo, &[]), "around an axis (round_silo)")?;
     recording()?;
 
     println!("\nswitched off, never named: the ratio must be 1 within noise");

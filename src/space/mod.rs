@@ -18,6 +18,7 @@ pub mod outline_rule;
 pub mod particles;
 pub mod parts;
 pub mod population;
+mod relation;
 pub mod seeding;
 pub mod segment;
 pub mod shape;

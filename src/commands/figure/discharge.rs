@@ -15,8 +15,6 @@ const VESSEL: f64 = 5.0;
 const FILLED: f64 = 4.5;
 /// Apertures of the figures of Beverloo's law, m.
 const APERTURES: [&str; 5] = ["0.5", "0.7", "0.9", "1.1", "1.3"];
-/// Diameter of the grains of the presets, m.
-const DIAMETER: f64 = 1.0 / 30.0;
 /// Time between which the rate of discharge is averaged, s: after the start, while the level is high.
 const STEADY: [f64; 2] = [1.5, 3.5];
 /// Levels between which the rates of the hour-glass and the water clock are averaged, m.
@@ -123,6 +121,8 @@ pub(super) struct Aperture {
     /// Exponent of the size in Beverloo's law, and the text of its inverse.
     exponent: f64,
     inverse: &'static str,
+    /// One over the diameter of the grains, 1/m.
+    grains: u32,
     /// Unit of the rate.
     unit: &'static str,
     /// Name of the picture.
@@ -135,6 +135,7 @@ pub(super) const SLIT: Aperture = Aperture {
     size: ["aperture", "W"],
     exponent: 1.5,
     inverse: "2/3",
+    grains: 30,
     unit: "m²/s",
     picture: "beverloo_rates",
 };
@@ -144,6 +145,8 @@ pub(super) const HOLE: Aperture = Aperture {
     size: ["diameter", "D"],
     exponent: 2.5,
     inverse: "2/5",
+    // The plain exponent is that of the size less a diameter: grains are half as large as in the plane.
+    grains: 60,
     unit: "m³/s",
     picture: "round_beverloo_rates",
 };
@@ -159,7 +162,11 @@ pub(super) fn beverloo(of: &Aperture, args: &Args, out: &Path) -> Result<String,
     let mut jobs = vec![];
     let [size, letter] = of.size;
     for aperture in APERTURES {
-        let more = [format!("aperture={aperture}"), format!("time.end={}", STEADY[1] + 0.1)];
+        let more = [
+            format!("aperture={aperture}"),
+            format!("diameter=1/{}", of.grains),
+            format!("time.end={}", STEADY[1] + 0.1),
+        ];
         let folder = format!("aperture_{aperture}");
         let run = (format!("{letter} = {aperture}"), folder, sets(args, &more));
         jobs.push(Job::new(&source, run, (args, out))?);
@@ -208,7 +215,8 @@ pub(super) fn beverloo(of: &Aperture, args: &Args, out: &Path) -> Result<String,
             "{letter} = {w} m: Q = {q:.4} {unit}, Q^({inverse}) off the line by {off:+.2} %\n"
         );
     }
-    said += &format!("{fit}; {letter}0 is {} grain diameters\n", short(least / DIAMETER));
+    said +=
+        &format!("{fit}; {letter}0 is {} grain diameters\n", short(least * f64::from(of.grains)));
     Ok(said + &super::files(&stem) + &runs::list(&jobs))
 }
 
