@@ -4,13 +4,14 @@
 //! channel    eta u = t (y - H) + (G/2)(H^2 - y^2)  with the shear stress t at the wall y = 0
 //!            t = G H/2  at rest,  t = 0  free slip,  t = (G H/2) H/(H + b)  with the slip length b,
 //!            t = mu p  where it slides with the friction mu under the pressure p
-//! Cosserat   w = (G/2 eta) (y - sinh ky/(k cosh kh)),  y from the middle of a channel of width 2 h
-//!            u = (G/2 eta) (h^2 - y^2) - [G eta_c/(eta (eta + eta_c) k^2)] (1 - cosh ky/cosh kh)
+//! Cosserat   w = (G/2 eta) (y - B sinh ky),  y from the middle of a channel of width 2 h
+//!            u = (G/2 eta) (h^2 - y^2) - [G eta_c B/(eta (eta + eta_c) k)] (cosh kh - cosh ky)
+//!            B = 1/(k cosh kh)  without a couple on the walls,  B = h/sinh kh  without rotation on them
 //! circle     u_theta = A r + C/r,   A a + C/a = -2 b C/a^2
 //! wedge      v_r = -(Q/r)(cos 2 theta - cos 2 alpha)/(sin 2 alpha - 2 alpha cos 2 alpha)
 //! cylinders  F = mu U K, with the mean velocity U of a square array
 //! ```
-//! Channel: force `G` per volume along it; the Cosserat fluid is free of couples at its walls. Circle: radius `a`, slip length `b`. Wedge: half-angle `alpha`; converging flow of G. B. Jeffery
+//! Channel: force `G` per volume along it. Circle: radius `a`, slip length `b`. Wedge: half-angle `alpha`; converging flow of G. B. Jeffery
 //! (1915) and G. Hamel (1917) without inertia. Cylinders: A. S. Sangani, A. Acrivos, "Slow flow past
 //! periodic arrays of cylinders with application to heat transfer", Int. J. Multiphase Flow 8 (1982)
 //! 193.
@@ -167,23 +168,25 @@ fn bank(name: &str, law: &str, (degrees, distance): (f64, f64)) -> String {
     format!("[[blocks]]\nname = \"{name}\"\n{law}\nshape.polygon = [{}]\n", corners.join(", "))
 }
 
-/// Flow of a Cosserat fluid along a channel across the mesh, free of couples at its walls, driven by a unit
-/// force. Exact velocity and rotation are prescribed on the sides of the box.
-pub fn slanted_cosserat(fluid: Fluid, degrees: f64, width: f64) -> Case {
+/// Flow of a Cosserat fluid along a channel across the mesh, driven by a unit force, without a couple on the
+/// walls or, `held`, without rotation on them. Exact velocity and rotation are prescribed on the sides of the
+/// box.
+pub fn slanted_cosserat(fluid: Fluid, degrees: f64, width: f64, held: bool) -> Case {
     let (s, c) = degrees.to_radians().sin_cos();
     let (h, k) = (0.5 * width, fluid.k());
     let (eta, eta_c) = (fluid.shear, fluid.coupling);
-    let [half, lag] = [0.5 / eta, eta_c / (eta * (eta + eta_c) * k * k)];
     let end = (k * h).cosh();
+    let b = if held { h / (k * h).sinh() } else { 1.0 / (k * end) };
+    let [half, lag] = [0.5 / eta, eta_c * b / (eta * (eta + eta_c) * k)];
     let y = across(degrees);
-    let speed = format!("({half:?}*({h:?}^2 - {y}^2) - {lag:?}*(1 - cosh({k:?}*{y})/{end:?}))");
-    let rotation = format!("{half:?}*({y} - sinh({k:?}*{y})/{:?})", k * end);
+    let speed = format!("({half:?}*({h:?}^2 - {y}^2) - {lag:?}*({end:?} - cosh({k:?}*{y})))");
+    let rotation = format!("{half:?}*({y} - {b:?}*sinh({k:?}*{y}))");
     let conditions = [
         ("velocity_x", format!("{c:?}*{speed}")),
         ("velocity_y", format!("{s:?}*{speed}")),
         ("rotation", rotation),
     ];
-    let no_slip = "kind = \"no_slip\"";
+    let no_slip = if held { "kind = \"no_slip\"\nrotation = 0" } else { "kind = \"no_slip\"" };
     let text = format!(
         "{}[body_force]\nx = {c:?}\ny = {s:?}\n{}{}",
         open_box("slanted_cosserat", &fluid.toml(), &conditions),
@@ -198,8 +201,8 @@ pub fn slanted_cosserat(fluid: Fluid, degrees: f64, width: f64) -> Case {
         exact: Exact {
             velocity: Box::new(move |x, y| {
                 let y = c * (y - 0.5) - s * (x - 0.5);
-                let u = half * (h * h - y * y) - lag * (1.0 - (k * y).cosh() / end);
-                [c * u, s * u, half * (y - (k * y).sinh() / (k * end))]
+                let u = half * (h * h - y * y) - lag * (end - (k * y).cosh());
+                [c * u, s * u, half * (y - b * (k * y).sinh())]
             }),
             pressure: Box::new(|_, _| 0.0),
         },

@@ -43,6 +43,7 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
                 side.rotation = None;
             }
             s.walls.iter_mut().for_each(|w| w.rotation = None);
+            s.blocks.iter_mut().for_each(|b| b.rotation = None);
         }
         EffectKind::Directors => {
             for m in s.materials.values_mut() {

@@ -289,13 +289,13 @@ pub(super) fn boundary(
     for w in &walls.walls {
         add(w.segment, w.kind, w.rotation, slips.walls[w.index]);
     }
-    for SiBlock { range, kind, index, .. } in &walls.blocks {
+    for SiBlock { range, kind, index, rotation, .. } in &walls.blocks {
         // Nozzles are blocks without slip.
         let slip = slips.blocks.get(*index).copied().flatten();
         for normal in 0..2 {
             let [from, to] = range[1 - normal];
             for at in range[normal] {
-                add(Segment { normal, at, from, to }, *kind, None, slip);
+                add(Segment { normal, at, from, to }, *kind, *rotation, slip);
             }
         }
     }

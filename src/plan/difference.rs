@@ -92,7 +92,7 @@ fn times(p: &Plan) -> (Vec<f64>, Option<f64>, [f64; 3]) {
     (frames.collect(), p.clock.max_step.map(|v| v * t), p.clock.limits())
 }
 
-/// Mesh lines and walls in SI units; a scheduled change must not alter them.
+/// Mesh lines and walls, with the rotation on solids of any shape, in SI units; a scheduled change must not alter them.
 fn geometry(p: &Plan) -> (Vec<f64>, Vec<[f64; 2]>) {
     let l = p.units.length;
     let lines = p.mesh.x.lines().iter().chain(p.mesh.y.lines()).map(|v| v * l).collect();
@@ -104,7 +104,10 @@ fn geometry(p: &Plan) -> (Vec<f64>, Vec<[f64; 2]>) {
         .collect();
     let outlines = p.mesh.parts().into_iter().flat_map(Parts::outlines);
     let outlines = outlines.flat_map(|o| o.line().into_iter().map(|p| p.map(|v| v * l)));
-    (lines, walls.into_iter().chain(outlines).collect())
+    let rate = p.units.rate();
+    let solids = p.mesh.parts().into_iter().flat_map(|parts| &parts.solids);
+    let rotations = solids.map(|s| s.rotation.map_or([0.0; 2], |w| [1.0, w * rate]));
+    (lines, walls.into_iter().chain(outlines).chain(rotations).collect())
 }
 
 /// Whether the materials of both have the same particle columns and the same kind of law.

@@ -1071,6 +1071,15 @@ pub struct Block {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-unit" = "1", "x-range" = "> 0", "x-default" = "by `kind`", "examples" = [0.3]))]
     pub wall_friction: Option<Quantity>,
+    /// Prescribed Cosserat rotation rate on its outline.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "1/s",
+        "x-range" = "any",
+        "x-default" = "free (no couple)",
+        "examples" = [0]
+    ))]
+    pub rotation: Option<Quantity>,
 }
 
 /// A nozzle: a solid block, one cell thick, that pushes material in through one of its faces. An

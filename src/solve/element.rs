@@ -106,20 +106,35 @@ pub fn mirror<const D: usize>(k: &mut Matrix) {
     }
 }
 
-/// Replaces the matrix of the velocities of a cell by that of its unknowns, `P' k P` with the map `P`.
+/// Replaces the matrix of the velocities and rotations of a cell by that of its unknowns, `P' k P` with the
+/// map `P`.
 pub fn embed<const D: usize>(k: &mut Matrix, map: &CellMap) {
     const U: usize = 2 * NODES;
+    let velocity = &map.velocity;
+    let rotation = map.rotation.as_ref().filter(|_| D == 3);
     let mut half: Matrix = [[0.0; LOCAL]; LOCAL];
     for i in 0..NODES * D {
         for j in 0..U {
-            half[i][j] = (0..U).map(|m| k[i][m] * map[m][j]).sum();
+            half[i][j] = (0..U).map(|m| k[i][m] * velocity[m][j]).sum();
         }
         half[i][U..].copy_from_slice(&k[i][U..]);
+        if let Some(rotation) = rotation {
+            for j in 0..NODES {
+                half[i][U + j] = (0..NODES).map(|m| k[i][U + m] * rotation[m][j]).sum();
+            }
+        }
     }
     *k = half;
     for i in 0..U {
         for j in 0..NODES * D {
-            k[i][j] = (0..U).map(|m| map[m][i] * half[m][j]).sum();
+            k[i][j] = (0..U).map(|m| velocity[m][i] * half[m][j]).sum();
+        }
+    }
+    if let Some(rotation) = rotation {
+        for i in 0..NODES {
+            for j in 0..NODES * D {
+                k[U + i][j] = (0..NODES).map(|m| rotation[m][i] * half[U + m][j]).sum();
+            }
         }
     }
     // Rounding differs between the two triangles.
@@ -133,21 +148,33 @@ pub fn embed<const D: usize>(k: &mut Matrix, map: &CellMap) {
 /// Forces on the unknowns of a cell, `P' f`.
 pub fn reduce<const D: usize>(f: &mut Nodal<D>, map: &CellMap) {
     let before = *f;
+    let velocity = &map.velocity;
     for b in 0..NODES {
         for d in 0..2 {
-            let rows = (0..2 * NODES).map(|i| map[i][NODES * d + b] * before[i % NODES][i / NODES]);
+            let rows =
+                (0..2 * NODES).map(|i| velocity[i][NODES * d + b] * before[i % NODES][i / NODES]);
             f[b][d] = rows.sum();
+        }
+    }
+    if let Some(rotation) = map.rotation.as_ref().filter(|_| D == 3) {
+        for b in 0..NODES {
+            f[b][D - 1] = (0..NODES).map(|a| rotation[a][b] * before[a][D - 1]).sum();
         }
     }
 }
 
-/// Velocities of a cell with the given unknowns, `P q`.
+/// Velocities and rotations of a cell with the given unknowns, `P q`.
 pub fn expand<const D: usize>(q: &mut Nodal<D>, map: &CellMap) {
     let before = *q;
     for a in 0..NODES {
         for c in 0..2 {
-            let row = &map[NODES * c + a];
+            let row = &map.velocity[NODES * c + a];
             q[a][c] = (0..2 * NODES).map(|j| row[j] * before[j % NODES][j / NODES]).sum();
+        }
+    }
+    if let Some(rotation) = map.rotation.as_ref().filter(|_| D == 3) {
+        for a in 0..NODES {
+            q[a][D - 1] = (0..NODES).map(|b| rotation[a][b] * before[b][D - 1]).sum();
         }
     }
 }

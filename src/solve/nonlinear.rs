@@ -304,8 +304,8 @@ impl<const D: usize> Stokes<D> {
         let (force, du) = (&work.residual.force, &work.correction.velocity);
         let relations = self.constraints.embedding();
         let [slope] = threads::sum(0..self.mesh.nodes(), |node| {
-            let first = if relations.is_some_and(|r| r.holds(node)) { 2 } else { 0 };
-            let free = (first..D).filter(|&c| !self.constraints.is_fixed(node, c));
+            let bound = |c: usize| relations.is_some_and(|r| r.binds(node, c));
+            let free = (0..D).filter(|&c| !bound(c) && !self.constraints.is_fixed(node, c));
             [free.map(|c| force[node][c] * du[node][c]).sum()]
         });
         let Some(relations) = relations else { return slope };

@@ -140,7 +140,11 @@ impl<const D: usize> Residual<D> {
     /// Power of the residual at the nodes with relations with the velocities `u`.
     pub(super) fn power_on_solids(&self, relations: &Embedding, u: &[[f64; D]]) -> f64 {
         let nodes = relations.nodes().zip(&self.on_solids);
-        nodes.map(|(node, f)| f[0] * u[node][0] + f[1] * u[node][1]).sum()
+        let of = |(node, f): (usize, &[f64; D])| {
+            let bound = (2..D).filter(|&c| relations.binds(node, c));
+            f[0] * u[node][0] + f[1] * u[node][1] + bound.map(|c| f[c] * u[node][c]).sum::<f64>()
+        };
+        nodes.map(of).sum()
     }
 }
 

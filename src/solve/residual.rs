@@ -223,7 +223,7 @@ impl<const D: usize> Stokes<D> {
                 if d == 0.0 {
                     continue;
                 }
-                let embedded = c < 2 && relations.is_some_and(|r| r.holds(node));
+                let embedded = relations.is_some_and(|r| r.binds(node, c));
                 if !embedded {
                     sums[2] += d * flow.velocity[node][c].powi(2);
                 }
@@ -259,7 +259,7 @@ impl<const D: usize> Stokes<D> {
             let (u, mut power) = (flow.velocity[node], 0.0);
             for c in 0..D {
                 power += load[node][c] * u[c];
-                let embedded = c < 2 && relations.is_some_and(|r| r.holds(node));
+                let embedded = relations.is_some_and(|r| r.binds(node, c));
                 if self.constraints.is_fixed(node, c) && !embedded {
                     power -= r.force[node][c] * u[c];
                 }

@@ -154,7 +154,7 @@ impl<const D: usize> Stokes<D> {
         out.clone_from(&work.residual.force);
         if let Some(relations) = self.constraints.embedding() {
             for (node, force) in relations.nodes().zip(&work.residual.on_solids) {
-                out[node][..2].copy_from_slice(&force[..2]);
+                out[node] = *force;
             }
         }
         // The friction along walls that slip is a force on the flow, and its opposite on the wall.

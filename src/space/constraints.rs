@@ -58,12 +58,15 @@ impl<const D: usize> Constraints<D> {
     /// prescribed before.
     pub fn embed(&mut self, mesh: &Mesh) {
         let Some(parts) = mesh.parts() else { return };
-        let relations = Embedding::new(mesh, parts, |node, c| self.fixed_value(node, c));
+        let given = |node, c| if c < D { self.fixed_value(node, c) } else { None };
+        let relations = Embedding::new(mesh, parts, given);
         for (node, c, value) in embedding::aligned(mesh, parts, |node| relations.holds(node)) {
-            self.fix(node, c, value);
+            if c < D {
+                self.fix(node, c, value);
+            }
         }
         for node in relations.nodes() {
-            for c in 0..2 {
+            for c in (0..D).filter(|&c| relations.binds(node, c)) {
                 let known = relations.known(node, c);
                 self.fixed[node][c] = known.is_some();
                 self.value[node][c] = known.unwrap_or(0.0);
@@ -134,9 +137,8 @@ impl<const D: usize> Constraints<D> {
         let relations = self.embedding.as_deref();
         for (node, u) in velocity.iter_mut().enumerate() {
             let (fixed, value) = (&self.fixed[node], &self.value[node]);
-            let first = if relations.is_some_and(|r| r.holds(node)) { 2 } else { 0 };
-            for c in first..D {
-                if fixed[c] {
+            for c in 0..D {
+                if fixed[c] && !relations.is_some_and(|r| r.binds(node, c)) {
                     u[c] = value[c];
                 }
             }

@@ -25,6 +25,7 @@ use super::outline::Point;
 use super::parts::{Parts, Solid};
 use super::relation::{Map, Node, Site, relation};
 use super::shape::{NODES, SIDE_NODES, side_normal};
+use super::turning::{RotationMap, Turning};
 
 /// Distance, in cells, below which a node is on an outline.
 const ON_OUTLINE: f64 = 1e-9;
@@ -34,12 +35,17 @@ const ON_OUTLINE: f64 = 1e-9;
 const STRAIGHT: f64 = 0.8;
 
 /// Corners beside each node of a cell that is not a corner.
-const BESIDE: [&[usize]; NODES] =
+pub(super) const BESIDE: [&[usize]; NODES] =
     [&[], &[0, 2], &[], &[0, 6], &[0, 2, 6, 8], &[2, 8], &[], &[6, 8], &[]];
 
-/// Matrix from the unknowns of the nodes of a cell to their velocities, `9 c + a` for component `c`
-/// of node `a`.
-pub type CellMap = [[f64; 2 * NODES]; 2 * NODES];
+/// Matrices from the unknowns of the nodes of a cell to their velocities and rotations.
+#[derive(Clone, Debug)]
+pub struct CellMap {
+    /// Velocities, `9 c + a` for component `c` of node `a`.
+    pub velocity: [[f64; 2 * NODES]; 2 * NODES],
+    /// Rotations; `None` if they are the unknowns.
+    pub rotation: Option<RotationMap>,
+}
 
 /// Relations of the nodes of cells with solids.
 #[derive(Clone, Debug)]
@@ -47,6 +53,8 @@ pub struct Embedding {
     nodes: Vec<Node>,
     /// Index in `nodes` of each node of the mesh, or `NONE`.
     index: Vec<u32>,
+    /// Relations of rotations, if a solid prescribes its own.
+    turning: Option<Turning>,
     /// Map of each cell with such a node.
     cells: Vec<Option<Box<CellMap>>>,
 }
@@ -85,7 +93,9 @@ impl Embedding {
             }
         }
         let walled = if parts.move_on() { walled(mesh, parts) } else { vec![] };
-        let mut out = Embedding { nodes: vec![], index: vec![NONE; mesh.nodes()], cells: vec![] };
+        let turning = Turning::new(mesh, parts, scale, |node| given(node, 2));
+        let index = vec![NONE; mesh.nodes()];
+        let mut out = Embedding { nodes: vec![], index, turning, cells: vec![] };
         for (node, site) in sites.iter().enumerate() {
             let Some(site) = site else { continue };
             let given = [0, 1].map(|c| given(node, c));
@@ -125,8 +135,16 @@ impl Embedding {
         self.index[node] != NONE
     }
 
+    /// Whether component `c` of a node, 2 for the rotation, is not its unknown but follows from a relation.
+    pub fn binds(&self, node: usize, c: usize) -> bool {
+        if c < 2 { self.holds(node) } else { self.turning.as_ref().is_some_and(|t| t.holds(node)) }
+    }
+
     /// Whether component `c` of the unknown of a node is not solved for, and its value.
     pub fn known(&self, node: usize, c: usize) -> Option<f64> {
+        if c == 2 {
+            return self.turning.as_ref()?.known(node);
+        }
         let n = self.node(node)?;
         if n.idle[c] { Some(0.0) } else { n.given[c] }
     }
@@ -146,7 +164,7 @@ impl Embedding {
         if mesh.solid[cell] || !nodes.iter().any(|&n| self.holds(n)) {
             return None;
         }
-        let mut map = Box::new([[0.0; 2 * NODES]; 2 * NODES]);
+        let mut map = [[0.0; 2 * NODES]; 2 * NODES];
         for (a, &node) in nodes.iter().enumerate() {
             let own = [(node as u32, IDENTITY)];
             let terms = self.node(node).map_or(&own[..], |n| &n.terms[..]);
@@ -159,11 +177,25 @@ impl Embedding {
                 }
             }
         }
-        Some(map)
+        let rotation = self.turning.as_ref().and_then(|t| t.map_of(nodes));
+        Some(Box::new(CellMap { velocity: map, rotation }))
     }
 
-    /// Replaces changes of the unknowns of the nodes with relations by those of their velocities.
+    /// Relations of rotations, in flows with rotation.
+    fn turning<const D: usize>(&self) -> Option<&Turning> {
+        self.turning.as_ref().filter(|_| D == 3)
+    }
+
+    /// Replaces changes of the unknowns of the nodes with relations by those of their velocities and
+    /// rotations.
     pub fn expand<const D: usize>(&self, velocity: &mut [[f64; D]]) {
+        self.expand_velocity(velocity);
+        if let Some(turning) = self.turning::<D>() {
+            turning.expand(D - 1, velocity);
+        }
+    }
+
+    fn expand_velocity<const D: usize>(&self, velocity: &mut [[f64; D]]) {
         let unknown = |n: u32| [0, 1].map(|c| velocity[n as usize][c]);
         let expanded: Vec<[f64; 2]> = self
             .nodes
@@ -196,6 +228,9 @@ impl Embedding {
                 }
             }
         }
+        if let Some(turning) = self.turning::<D>() {
+            turning.reduce(D - 1, force);
+        }
     }
 
     /// Makes a velocity satisfy the relations; where it does, it does not change.
@@ -205,10 +240,13 @@ impl Embedding {
             let q = n.unknown([u[0] - n.offset[0], u[1] - n.offset[1]]);
             u[..2].copy_from_slice(&q);
         }
-        self.expand(velocity);
+        self.expand_velocity(velocity);
         for n in &self.nodes {
             let u = &mut velocity[n.node as usize];
             (u[0], u[1]) = (u[0] + n.offset[0], u[1] + n.offset[1]);
+        }
+        if let Some(turning) = self.turning::<D>() {
+            turning.impose(D - 1, velocity);
         }
     }
 }
@@ -235,7 +273,7 @@ fn unit(mesh: &Mesh) -> f64 {
         + size(mesh.y.cells() as f64, mesh.y.length()))
 }
 
-/// Components of the velocity of nodes on outlines along mesh lines that are those of the solid: nodes
+/// Components of the velocity and rotation (2) of nodes on outlines along mesh lines that are those of the solid: nodes
 /// of free cells without a part, with the component and its value.
 pub fn aligned(
     mesh: &Mesh,
@@ -260,6 +298,7 @@ pub fn aligned(
                     out.push((node, c, solid.velocity[c]));
                 }
             }
+            out.extend(solid.rotation.map(|w| (node, 2, w)));
         }
     }
     out

@@ -26,4 +26,5 @@ pub mod solids;
 pub mod stream;
 mod stream_fit;
 mod ties;
+mod turning;
 pub mod walls;

@@ -16,12 +16,14 @@ pub struct Solid {
     pub no_slip: bool,
     /// Velocity, in the plan's units.
     pub velocity: Point,
+    /// Prescribed Cosserat rotation rate on its outline, in the plan's units; `None`: no couple.
+    pub rotation: Option<f64>,
 }
 
 impl Solid {
     /// A solid at rest.
     pub fn at_rest(name: impl Into<String>, outline: Outline, no_slip: bool) -> Solid {
-        Solid { name: name.into(), outline, no_slip, velocity: [0.0; 2] }
+        Solid { name: name.into(), outline, no_slip, velocity: [0.0; 2], rotation: None }
     }
 
     /// Whether it moves.

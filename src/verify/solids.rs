@@ -34,20 +34,23 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         curves: vec![],
     };
     let mut table = Table::new(
-        "Relative error of the velocity in the fluid.",
-        &["case", "cells", "velocity", "rate"],
+        "Relative errors in the fluid.",
+        &["case", "cells", "velocity", "rate", "rotation"],
     );
     use LowerWall::{FreeSlip, Friction, NoSlip, Slip};
     let channel = |degrees, lower| slanted_channel(SlantedChannel { degrees, width: 0.25, lower });
-    let list: [(&str, Case); 12] = [
+    let cosserat = |degrees, held| slanted_cosserat(COSSERAT, degrees, 0.25, held);
+    let list: [(&str, Case); 14] = [
         ("channel at 30 degrees", channel(30.0, NoSlip)),
         ("channel at 12 degrees, lower wall slips", channel(12.0, FreeSlip)),
         ("channel at 30 degrees, lower wall slips", channel(30.0, FreeSlip)),
         ("channel at 12 degrees, slip length 0.1", channel(12.0, Slip(0.1))),
         ("channel at 30 degrees, slip length 0.1", channel(30.0, Slip(0.1))),
         ("channel at 30 degrees, wall friction", channel(30.0, Friction(0.4, 0.2))),
-        ("Cosserat channel at 12 degrees", slanted_cosserat(COSSERAT, 12.0, 0.25)),
-        ("Cosserat channel at 30 degrees", slanted_cosserat(COSSERAT, 30.0, 0.25)),
+        ("Cosserat channel at 12 degrees", cosserat(12.0, false)),
+        ("Cosserat channel at 30 degrees", cosserat(30.0, false)),
+        ("Cosserat channel at 12 degrees, no rotation on walls", cosserat(12.0, true)),
+        ("Cosserat channel at 30 degrees, no rotation on walls", cosserat(30.0, true)),
         ("circle, slip length 0.1", slipping_circle(0.1)),
         ("circle, slip length 0.01", slipping_circle(0.01)),
         ("wedge of 20 degrees", wedge(20.0)),
@@ -56,10 +59,12 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     for (name, case) in &list {
         let mut results: Vec<(u32, f64)> = vec![];
         for &n in effort.take(&CELLS) {
-            let e = case.errors(n, &["accuracy.nonlinear_tolerance=1e-6"])?.velocity;
+            let errors = case.errors(n, &["accuracy.nonlinear_tolerance=1e-6"])?;
+            let e = errors.velocity;
+            let rotation = case.rates.rotation.map_or(String::new(), |_| number(errors.rotation));
             let last = results.last();
             let slope = last.map_or(String::new(), |&c| format!("{:.2}", rate(c, (n, e))));
-            table.rows.push(vec![(*name).into(), n.to_string(), number(e), slope]);
+            table.rows.push(vec![(*name).into(), n.to_string(), number(e), slope, rotation]);
             results.push((n, e));
         }
         let (Some(&first), Some(&last)) = (results.first(), results.last()) else { continue };

@@ -218,3 +218,26 @@ fn the_normal_stress_of_a_fluid_at_rest_is_its_weight() {
         assert!(p.shear.abs() < 1.0, "{p:?}");
     }
 }
+
+#[test]
+fn rotation_on_a_polygon_along_mesh_lines_is_that_on_a_rectangle() {
+    let scene_of = |shape: &str| {
+        format!(
+            "schema = 1\nname = \"step\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\ncells = 8\n[mesh]\n\
+             grading = []\n[time]\nend = 1\n[materials.fluid]\nshear_viscosity = 1\ncoupling_viscosity = 2\n\
+             internal_length = 0.1\n[[regions]]\nmaterial = \"fluid\"\n[boundaries]\nleft.kind = \"periodic\"\n\
+             right.kind = \"periodic\"\nbottom.kind = \"no_slip\"\ntop = {{ kind = \"no_slip\", velocity_x = 1 }}\n\
+             [[blocks]]\nname = \"step\"\nkind = \"no_slip\"\nrotation = 0.3\n{shape}\n"
+        )
+    };
+    let plain = crate::scene(&scene_of("x = [0.25, 0.5]\ny = [0.25, 0.5]"), &[]);
+    let polygon = "shape.polygon = [[0.25, 0.25], [0.5, 0.25], [0.5, 0.5], [0.25, 0.5]]";
+    let solid = crate::scene(&scene_of(polygon), &[]);
+    for k in 0..100 {
+        let p = [(f64::from(k % 10) + 0.5) / 10.0, (f64::from(k / 10) + 0.5) / 10.0];
+        let (a, b) = (plain.velocity_at(p), solid.velocity_at(p));
+        assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-8), "{p:?} {a:?} {b:?}");
+    }
+    let [_, _, on_block] = plain.velocity_at([0.25, 0.3]);
+    assert!((on_block - 0.3).abs() < 1e-9, "{on_block}");
+}

@@ -179,6 +179,7 @@ pub(super) fn mesh(
         outline: s.outline.in_units(units.length),
         no_slip: s.kind == WallKind::NoSlip,
         velocity: s.velocity.map(|v| v / units.velocity()),
+        rotation: s.rotation.map(|w| w / units.rate()),
     });
     let mesh = mesh.with_solids(solids.collect());
     if mesh.solid.iter().all(|&s| s) {

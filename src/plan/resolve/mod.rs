@@ -102,6 +102,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
         name: s.name.clone(),
         range: s.block,
         kind: WallKind::NoSlip,
+        rotation: None,
     }));
     let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides, sources: &sources };
     let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &lines, &units)?);

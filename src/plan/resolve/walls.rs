@@ -31,6 +31,8 @@ pub(in crate::plan) struct SiBlock {
     /// Ranges along x and y, m.
     pub(in crate::plan) range: [[f64; 2]; 2],
     pub(in crate::plan) kind: WallKind,
+    /// Prescribed rotation rate, 1/s.
+    pub(in crate::plan) rotation: Option<f64>,
 }
 
 /// A solid of any shape in SI coordinates.
@@ -44,6 +46,8 @@ pub(in crate::plan) struct SiSolid {
     pub(in crate::plan) kind: WallKind,
     /// Velocity, m/s.
     pub(in crate::plan) velocity: [f64; 2],
+    /// Prescribed rotation rate, 1/s.
+    pub(in crate::plan) rotation: Option<f64>,
 }
 
 /// A wall in SI coordinates.
@@ -131,7 +135,7 @@ impl Walls {
                 }
                 continue;
             }
-            let rotation = w.rotation.as_ref().map(|q| q.eval(scope)).transpose();
+            let rotation = rotation(&w.rotation, scope);
             match (
                 axis_segment(&format!("wall `{}`", w.name), &w.from, &w.to, scope, domain),
                 rotation,
@@ -156,14 +160,16 @@ impl Walls {
                 Ok(Some(own)) => {
                     let known = poses.and_then(|poses| poses.get(moving.len()));
                     let pose = known.copied().unwrap_or_else(|| Pose::at_start(&own));
-                    match outline_of(b, scope) {
-                        Ok(outline) => solids.push(SiSolid {
+                    match outline_of(b, scope).and_then(|o| Ok((o, rotation(&b.rotation, scope)?)))
+                    {
+                        Ok((outline, rotation)) => solids.push(SiSolid {
                             index,
                             wall: false,
                             name: b.name.clone(),
                             outline: outline.moved(pose.displacement),
                             kind: b.kind.unwrap_or_default(),
                             velocity: pose.velocity,
+                            rotation,
                         }),
                         Err(e) => errors.push(e),
                     }
@@ -299,10 +305,11 @@ enum Resolved {
 fn resolved((index, b): (usize, &Block), scope: &Scope, domain: [[f64; 2]; 2]) -> Result<Resolved> {
     let what = format!("block `{}`", b.name);
     let (name, kind) = (b.name.clone(), b.kind.unwrap_or_default());
+    let rotation = rotation(&b.rotation, scope)?;
     let solid = |outline, place: &Quantity| {
         outlines::touches(&outline, domain, place, &what)?;
         let (name, velocity) = (name.clone(), [0.0; 2]);
-        Ok(Resolved::Solid(SiSolid { index, wall: false, name, outline, kind, velocity }))
+        Ok(Resolved::Solid(SiSolid { index, wall: false, name, outline, kind, velocity, rotation }))
     };
     let (x, y) = match (&b.x, &b.y, &b.shape) {
         (Some(x), Some(y), None) | (None, None, Some(SolidShape::Rectangle { x, y })) => (x, y),
@@ -325,7 +332,7 @@ fn resolved((index, b): (usize, &Block), scope: &Scope, domain: [[f64; 2]; 2]) -
             ));
         }
     }
-    Ok(Resolved::Aligned(SiBlock { index, name, range, kind }))
+    Ok(Resolved::Aligned(SiBlock { index, name, range, kind, rotation }))
 }
 
 /// A wall with a thickness.
@@ -336,13 +343,6 @@ fn thick(
     domain: [[f64; 2]; 2],
 ) -> Result<SiSolid> {
     let what = format!("wall `{}`", w.name);
-    if let Some(rotation) = &w.rotation {
-        return Err(SceneError::at(
-            rotation,
-            format!("{what} has a thickness and a rotation"),
-            "the rotation is free on walls with a thickness: remove `rotation`",
-        ));
-    }
     let (from, to) = (point(&w.from, scope)?, point(&w.to, scope)?);
     if from == to {
         return Err(SceneError::at(
@@ -361,7 +361,13 @@ fn thick(
         outline,
         kind: w.kind.unwrap_or_default(),
         velocity: [0.0; 2],
+        rotation: rotation(&w.rotation, scope)?,
     })
+}
+
+/// The rotation rate on a wall or a block, if it is prescribed.
+fn rotation(given: &Option<Quantity>, scope: &Scope) -> Result<Option<f64>> {
+    given.as_ref().map(|q| q.eval(scope)).transpose()
 }
 
 /// A free end of a wall.
