@@ -354,7 +354,10 @@ function makeKnob(knob) {
     label.prepend(make("span", { className: "tag", title: `A change restarts the run: it changes ${knob.restarts}` }, "restarts"));
   }
   const entry = make("div", { className: knob.unit ? "box unit" : "box" }, field);
-  if (knob.unit) entry.append(make("span", {}, knob.unit));
+  if (knob.unit) {
+    entry.append(make("span", {}, knob.unit));
+    field.style.paddingRight = `max(38px, calc(${knob.unit.length}ch + 12px))`;
+  }
   const turn = make("div", { className: "turn" });
   if (knob.min !== null && knob.max !== null && knob.max > knob.min) {
     const slider = make("input", { type: "range", min: 0, max: STEPS, step: 1, ariaLabel: `${knob.label}, slider` });
