@@ -134,6 +134,10 @@ fn main() -> Outcome<()> {
     let named = LID.to_string() + "[materials.rest]\nshear_viscosity = 1\nbackground = true\n";
 
     let round_silo = include_str!("../presets/round_silo.toml");
+    let stone =
+        |shape: &str| format!("{LID}[[blocks]]\nname = \"stone\"\nkind = \"no_slip\"\n{shape}\n");
+    let circle = stone("shape.circle = { centre = [0.5, 0.5], radius = 0.2 }");
+    let square = stone("x = [0.325, 0.675]\ny = [0.325, 0.675]");
     let flat_silo = round_silo.replace("geometry = \"axisymmetric\"\n", "");
 
     println!("step with, step without (processor time, medians of {STEPS}), ratio");
@@ -145,6 +149,7 @@ fn main() -> Outcome<()> {
     removed("silo", &[], EffectKind::Stabilisation, "stabilised stratification (silo)")?;
     against((LID, &["gravity[1]=-10"]), (LID, &[]), "gravity (lid)")?;
     against((round_silo, &[]), (&flat_silo, &[]), "around an axis (round_silo)")?;
+    against((&circle, &[]), (&square, &[]), "a circle instead of a square (lid)")?;
     recording()?;
 
     println!("\nswitched off, never named: the ratio must be 1 within noise");

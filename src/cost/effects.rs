@@ -67,6 +67,7 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
         EffectKind::CarriedViscosity | EffectKind::CarriedDensity => return None,
         EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => return None,
         EffectKind::Slip | EffectKind::Inflow => return None,
+        EffectKind::Solids | EffectKind::Moving => return None,
     }
     // The quantity of interest may have been removed with the effect.
     s.interest = None;
@@ -135,6 +136,7 @@ pub fn measure(plan: &Arc<Plan>, list: &mut EffectList, steps: u32) -> Result<()
             EffectKind::Flow | EffectKind::CarriedDensity | EffectKind::CarriedViscosity => None,
             EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => None,
             EffectKind::Slip | EffectKind::Inflow => None,
+            EffectKind::Solids | EffectKind::Moving => None,
             // Computed once, at the start.
             EffectKind::BodyForce => Some(0.0),
             EffectKind::Gravity | EffectKind::Acceleration => Some(phases.weight / total),

@@ -2,6 +2,7 @@
 //! `grainscope plan`.
 
 use super::Plan;
+use super::effect_kind::EffectKind;
 use crate::scene::Quadrature;
 use serde::Serialize;
 
@@ -15,74 +16,6 @@ const MOVING: [&str; 7] = [
     "dye",
     "inflow",
 ];
-
-/// Effects that a scene may need.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EffectKind {
-    /// Velocity and pressure.
-    Flow,
-    /// Cosserat rotation.
-    Rotation,
-    /// Directors of layered materials.
-    Directors,
-    /// Gravity.
-    Gravity,
-    /// Stabilisation of stable stratification at large steps.
-    Stabilisation,
-    /// Force and couple per volume, fixed in space.
-    BodyForce,
-    /// Acceleration fixed in space.
-    Acceleration,
-    /// Viscosity carried by particles.
-    CarriedViscosity,
-    /// Density carried by particles.
-    CarriedDensity,
-    /// Volume change (finite bulk viscosity).
-    VolumeChange,
-    /// Dye lines.
-    Dye,
-    /// Gauges.
-    Gauges,
-    /// Cells that contain several materials.
-    CutCells,
-    /// Viscosities that depend on the flow: friction, a yield stress or a flow index.
-    FlowCurves,
-    /// The zero of the pressure of a closed domain.
-    PressureZero,
-    /// Inertia.
-    Inertia,
-    /// Slip along walls.
-    Slip,
-    /// Material that enters through sides and nozzles.
-    Inflow,
-}
-
-impl EffectKind {
-    /// Name of the effect.
-    pub fn name(self) -> &'static str {
-        use EffectKind::*;
-        match self {
-            Flow => "velocity and pressure",
-            Rotation => "Cosserat rotation",
-            Directors => "directors",
-            Gravity => "gravity",
-            Stabilisation => "stabilised stratification",
-            BodyForce => "fixed body force",
-            Acceleration => "acceleration",
-            CarriedViscosity => "carried viscosity",
-            CarriedDensity => "carried density",
-            VolumeChange => "volume change",
-            Dye => "dye lines",
-            Gauges => "gauges",
-            CutCells => "cut cells",
-            FlowCurves => "flow curves",
-            PressureZero => "the zero of the pressure",
-            Inertia => "inertia",
-            Slip => "slip at walls",
-            Inflow => "inflow",
-        }
-    }
-}
 
 /// An effect, whether it is solved, and why.
 #[derive(Clone, Debug, Serialize)]
@@ -391,6 +324,11 @@ impl Plan {
         add(Slip, !slips.is_empty(), why(!slips.is_empty(), slips, no), 0, 0, &[]);
         let (inflow, no) = (self.inflow(), "nothing enters through sides or [[sources]]");
         add(Inflow, !inflow.is_empty(), why(!inflow.is_empty(), inflow, no), 0, 0, &["inflow"]);
+        let (solids, no) = (self.solids(), "every wall and block is along mesh lines");
+        add(Solids, !solids.is_empty(), why(!solids.is_empty(), solids, no), 0, 0, &[]);
+        let moving = self.moving.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
+        let (moves, stage) = (!moving.is_empty(), "placing of solids");
+        add(Moving, moves, why(moves, moving, "no block has a velocity"), 0, 0, &[stage]);
         list
     }
 }

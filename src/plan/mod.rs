@@ -8,6 +8,7 @@
 pub mod boundary;
 mod change;
 mod difference;
+mod effect_kind;
 mod effects;
 mod forces;
 pub mod loads;
@@ -23,7 +24,8 @@ pub mod units;
 mod warning;
 
 pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
-pub use effects::{Effect, EffectKind, EffectList, StepTime};
+pub use effect_kind::EffectKind;
+pub use effects::{Effect, EffectList, StepTime};
 pub use forces::ForceGauge;
 pub use moving::{Moving, Pose};
 pub use resolve::resolve;

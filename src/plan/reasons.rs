@@ -86,6 +86,14 @@ impl Plan {
         list.join("; ")
     }
 
+    /// Names of the solids of any shape and the number of cells that they cut; empty if there are none.
+    pub(super) fn solids(&self) -> String {
+        let Some(parts) = self.mesh.parts() else { return String::new() };
+        let names: Vec<&str> = parts.solids.iter().map(|s| s.name.as_str()).collect();
+        let (cut, all) = (parts.all().count(), self.mesh.cells());
+        format!("{}: {cut} of {all} cells are cut", names.join(", "))
+    }
+
     /// What enters, and where; empty if nothing does.
     pub(super) fn inflow(&self) -> String {
         let name = |m: u8| &self.state.materials[usize::from(m)].name;
