@@ -23,7 +23,7 @@
 use super::mesh::Mesh;
 use super::outline::Point;
 use super::parts::{Parts, Solid};
-use super::relation::{Map, Node, Site, relation};
+use super::relation::{BESIDE, Map, Node, Site, relation};
 use super::shape::{NODES, SIDE_NODES, side_normal};
 use super::turning::{RotationMap, Turning};
 
@@ -33,10 +33,6 @@ const ON_OUTLINE: f64 = 1e-9;
 /// Smallest cosine of the angle between two normals in a cell with a straight wall. Where the
 /// normals differ by more, the cell has a corner of a solid, and walls that slip do not slip.
 const STRAIGHT: f64 = 0.8;
-
-/// Corners beside each node of a cell that is not a corner.
-pub(super) const BESIDE: [&[usize]; NODES] =
-    [&[], &[0, 2], &[], &[0, 6], &[0, 2, 6, 8], &[2, 8], &[], &[6, 8], &[]];
 
 /// Matrices from the unknowns of the nodes of a cell to their velocities and rotations.
 #[derive(Clone, Debug)]

@@ -2,12 +2,17 @@
 //! the nodes of its cell; see [`embedding`](super::embedding).
 
 use super::outline::Point;
+use super::shape::NODES;
 
 /// Distance, in cells, below which the unknown of a corner is not computed from its velocity.
 pub(super) const NEAR: f64 = 1e-6;
 
 /// Smallest component of the direction of a wall from which the velocity along it is computed.
 const OBLIQUE: f64 = 0.3;
+
+/// Corners beside each node of a cell that is not a corner.
+pub(super) const BESIDE: [&[usize]; NODES] =
+    [&[], &[0, 2], &[], &[0, 6], &[0, 2, 6, 8], &[2, 8], &[], &[6, 8], &[]];
 
 /// Matrix of a linear map of two components.
 pub(super) type Map = [[f64; 2]; 2];

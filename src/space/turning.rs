@@ -9,10 +9,9 @@
 //! other node   w_a = W + d_a mean of q over the corners beside it
 //! ```
 
-use super::embedding::BESIDE;
 use super::mesh::Mesh;
 use super::parts::Parts;
-use super::relation::NEAR;
+use super::relation::{BESIDE, NEAR};
 use super::shape::NODES;
 
 /// Matrix from the unknowns of the rotation of the nodes of a cell to their rotations.
