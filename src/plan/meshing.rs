@@ -52,6 +52,23 @@ impl Sizing {
             .fold(self.size, f64::min)
     }
 
+    /// Coordinates among `wished` that are a cell or more from all required ones and from each other;
+    /// equal ones count once. Of two that are closer, neither is taken, so that mirror images stay such.
+    pub fn granted(&self, demanded: &[Line], wished: &[f64]) -> Vec<f64> {
+        let low = demanded.iter().map(|l| l.at).fold(f64::INFINITY, f64::min);
+        let high = demanded.iter().map(|l| l.at).fold(f64::NEG_INFINITY, f64::max);
+        let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (high - low);
+        let far = |a: f64, b: f64| self.cells_between(a.min(b), a.max(b)) >= 1.0 - 1e-6;
+        let mut wished: Vec<f64> =
+            wished.iter().copied().filter(|&w| w > low && w < high).collect();
+        wished.sort_by(f64::total_cmp);
+        wished.dedup_by(|b, a| same(*a, *b));
+        let free = |&w: &f64| {
+            demanded.iter().all(|l| far(l.at, w)) && wished.iter().all(|&o| o == w || far(o, w))
+        };
+        wished.iter().copied().filter(free).collect()
+    }
+
     /// Mesh lines along an axis, m: they include all required coordinates, and the cells in between
     /// are as large as the sizing allows.
     pub fn lines(&self, mut demanded: Vec<Line>) -> Result<Vec<f64>, TooClose> {
@@ -192,5 +209,15 @@ mod tests {
         let s = Sizing { size: 0.25, refinements: vec![], growth: 1.2 };
         let e = s.lines(vec![line(0.0), line(0.1), line(1.0)]).unwrap_err();
         assert_eq!((e.first.at, e.second.at), (0.0, 0.1));
+    }
+
+    #[test]
+    fn wishes_are_granted_where_there_is_room_and_to_mirror_images_alike() {
+        let s = Sizing { size: 0.25, refinements: vec![], growth: 1.5 };
+        let demanded = [line(-1.0), line(1.0), line(0.0)];
+        // Two that are too close to each other, one too close to a line, one outside, one twice.
+        let wished = [-0.6, -0.5, 0.5, 0.6, 0.1, 3.0, -0.3, 0.3, 0.3];
+        assert!(s.granted(&demanded, &wished).is_empty());
+        assert_eq!(s.granted(&demanded, &[-0.4, 0.4, 0.4, 0.1]), [-0.4, 0.4]);
     }
 }

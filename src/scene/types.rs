@@ -257,6 +257,8 @@ pub enum GradingTarget {
     /// All no-slip walls and sides, and sides with a given tangential velocity or rotation; a side
     /// counts if one of its parts is such.
     Walls,
+    /// The corners of blocks around which material may flow.
+    Corners,
     /// A coordinate x.
     X(
         /// Coordinate x.

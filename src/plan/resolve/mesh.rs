@@ -100,8 +100,16 @@ pub(super) fn mesh(
     let refinements = refinements(scene, scope, domain, (walls, sides))?;
     let periodic = periodic(scene)?;
     let mut axes = Vec::new();
-    for (c, demanded) in lines.into_iter().enumerate() {
+    let corners = walls.corners(domain);
+    for (c, mut demanded) in lines.into_iter().enumerate() {
         let sizing = Sizing { size, refinements: refinements[c].clone(), growth };
+        // Corners of solids attract lines where there is room.
+        let wished: Vec<f64> = corners.iter().map(|corner| corner.at[c]).collect();
+        demanded.extend(sizing.granted(&demanded, &wished).into_iter().map(|at| Line {
+            at,
+            owner: "a corner of a block".into(),
+            explicit: false,
+        }));
         let estimate = (domain[c][1] - domain[c][0]) / size;
         if estimate > MAX_CELLS as f64 {
             return Err(SceneError::of_key(
@@ -233,6 +241,13 @@ fn refinements(
                 for tip in if lips.is_empty() { ends() } else { lips } {
                     for c in 0..2 {
                         out[c].push(Refinement { at: tip[c], factor });
+                    }
+                }
+            }
+            GradingTarget::Corners => {
+                for corner in walls.corners(domain).iter().filter(|corner| corner.salient) {
+                    for c in 0..2 {
+                        out[c].push(Refinement { at: corner.at[c], factor });
                     }
                 }
             }

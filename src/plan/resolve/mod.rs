@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod axis;
+mod corners;
 mod drafts;
 mod dye;
 mod flow_curves;

@@ -1,0 +1,36 @@
+//! This module finds the corners of solids, which attract mesh lines.
+
+use super::walls::Walls;
+use crate::space::outline::Outline;
+
+/// A corner of a solid that is in the domain and does not move.
+pub(super) struct Corner {
+    pub(super) at: [f64; 2],
+    /// Whether the solid has less than half of the angles there, so that flow around it is singular.
+    pub(super) salient: bool,
+}
+
+impl Walls {
+    /// Corners of polygons and of blocks along mesh lines.
+    pub(super) fn corners(&self, [x, y]: [[f64; 2]; 2]) -> Vec<Corner> {
+        let moves = |name: &str| self.moving.iter().any(|m| m.name == name);
+        let mut out = Vec::new();
+        for solid in self.solids.iter().filter(|s| !moves(&s.name)) {
+            let Outline::Polygon(corners) = &solid.outline else { continue };
+            let n = corners.len();
+            out.extend((0..n).map(|k| {
+                let [a, b, c] = [corners[(k + n - 1) % n], corners[k], corners[(k + 1) % n]];
+                let turn = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]);
+                Corner { at: b, salient: turn > 0.0 }
+            }));
+        }
+        for block in &self.blocks {
+            let [bx, by] = block.range;
+            let all = bx.into_iter().flat_map(|x| by.map(|y| [x, y]));
+            out.extend(all.map(|at| Corner { at, salient: true }));
+        }
+        let inside = |p: [f64; 2]| p[0] >= x[0] && p[0] <= x[1] && p[1] >= y[0] && p[1] <= y[1];
+        out.retain(|corner| inside(corner.at));
+        out
+    }
+}
