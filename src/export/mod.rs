@@ -116,15 +116,39 @@ pub fn read(run: &Path) -> Result<Frames, ExportError> {
     Ok(frames)
 }
 
-/// Writes all pictures into a folder. Returns the number of files.
+/// Writes all pictures into a folder, and removes the later pictures of an earlier export of the same format.
+/// Returns the number of files.
 pub fn write(frames: &Frames, format: Format, folder: &Path) -> Result<usize, ExportError> {
-    std::fs::create_dir_all(folder)
-        .map_err(|source| ExportError::Write { path: folder.to_owned(), source })?;
-    match format {
-        Format::Vtu => vtu::write(frames, folder),
-        Format::Csv => tables::write(frames, folder),
-        Format::Parquet => columns::write(frames, folder),
+    let fault = |source| ExportError::Write { path: folder.to_owned(), source };
+    std::fs::create_dir_all(folder).map_err(fault)?;
+    let files = match format {
+        Format::Vtu => vtu::write(frames, folder)?,
+        Format::Csv => tables::write(frames, folder)?,
+        Format::Parquet => return columns::write(frames, folder),
+    };
+    for entry in std::fs::read_dir(folder).map_err(fault)? {
+        let path = entry.map_err(fault)?.path();
+        let number = path.file_name().and_then(|name| number(name.to_str()?, format));
+        let stale = number.is_some_and(|n| n >= frames.instants.len());
+        // Other files with such names are not ours.
+        let ours = |kind| replace::may_replace(&path, kind).is_ok();
+        if stale
+            && [Kind::Vtk, Kind::Table("x,y,"), Kind::Table("surface,along,")]
+                .map(ours)
+                .contains(&true)
+        {
+            std::fs::remove_file(&path).map_err(fault)?;
+        }
     }
+    Ok(files)
+}
+
+/// Number of the picture in the name of a file that an export writes.
+fn number(name: &str, format: Format) -> Option<usize> {
+    let extension = if format == Format::Vtu { ".vtu" } else { ".csv" };
+    let (group, digits) = name.strip_suffix(extension)?.rsplit_once('_')?;
+    let known = ["particles", "fields", "stresses"].contains(&group) && digits.len() >= 5;
+    digits.parse().ok().filter(|_| known && digits.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Writes a VTK file or a table.
@@ -147,5 +171,39 @@ impl Frames {
             self.instants.insert(k, Instant { time_s, ..Instant::default() });
         }
         &mut self.instants[k]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_of_a_longer_export_are_removed_and_other_files_are_not() {
+        let folder = crate::testing::TempFolder::new().expect("a folder");
+        let frames = |n: usize| Frames {
+            instants: (0..n)
+                .map(|k| Instant {
+                    time_s: k as f64,
+                    particles: Some(ParticleSnapshot {
+                        positions: vec![[0.0, 1.0]],
+                        class: vec![0],
+                        ..ParticleSnapshot::default()
+                    }),
+                    ..Instant::default()
+                })
+                .collect(),
+            materials: vec!["mud".into()],
+            ..Frames::default()
+        };
+        let here = |name: &str| folder.path().join(name);
+        for format in [Format::Csv, Format::Vtu] {
+            write(&frames(4), format, folder.path()).expect("written");
+        }
+        std::fs::write(here("particles_00009.csv"), "mine\n").expect("written");
+        write(&frames(2), Format::Csv, folder.path()).expect("written");
+        let there = |n: usize, end: &str| here(&format!("particles_{n:05}.{end}")).exists();
+        assert_eq!([0, 1, 2, 3].map(|n| there(n, "csv")), [true, true, false, false]);
+        assert!(there(3, "vtu") && there(9, "csv"));
     }
 }
