@@ -11,12 +11,24 @@ pub(super) struct Corner {
 }
 
 impl Walls {
-    /// Corners of polygons and of blocks along mesh lines.
+    /// Corners of polygons that touch no other solid, and of blocks along mesh lines.
     pub(super) fn corners(&self, [x, y]: [[f64; 2]; 2]) -> Vec<Corner> {
         let moves = |name: &str| self.moving.iter().any(|m| m.name == name);
         let mut out = Vec::new();
-        for solid in self.solids.iter().filter(|s| !moves(&s.name)) {
+        let tiny = 1e-9 * (x[1] - x[0]).max(y[1] - y[0]);
+        for (index, solid) in self.solids.iter().enumerate().filter(|(_, s)| !moves(&s.name)) {
             let Outline::Polygon(corners) = &solid.outline else { continue };
+            // Measured: lines through corners of two solids that touch each other can take three times the
+            // corrections.
+            let near = |of: &[[f64; 2]], o: &Outline| of.iter().any(|&p| o.distance(p) <= tiny);
+            let touches = |o: &Outline| {
+                let theirs = if let Outline::Polygon(theirs) = o { &theirs[..] } else { &[] };
+                near(corners, o) || near(theirs, &solid.outline)
+            };
+            let others = self.solids.iter().enumerate().filter(|(k, _)| *k != index);
+            if others.map(|(_, o)| &o.outline).any(touches) {
+                continue;
+            }
             let n = corners.len();
             out.extend((0..n).map(|k| {
                 let [a, b, c] = [corners[(k + n - 1) % n], corners[k], corners[(k + 1) % n]];
