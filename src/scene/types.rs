@@ -61,7 +61,7 @@ pub struct Scene {
     /// Thin walls inside the domain.
     #[serde(default)]
     pub walls: Vec<Wall>,
-    /// Solid rectangles inside the domain.
+    /// Solids inside the domain.
     #[serde(default)]
     pub blocks: Vec<Block>,
     /// Nozzles inside the domain that push material in.
@@ -921,7 +921,7 @@ pub struct Wall {
     /// Coordinates x and y of the other end.
     #[schemars(extend(
         "x-unit" = "m",
-        "x-range" = "in the domain; `x` or `y` as in `from`",
+        "x-range" = "in the domain; `x` or `y` as in `from`, or any with `thickness`",
         "examples" = [["aperture", 0.5]]
     ))]
     pub to: [Quantity; 2],
@@ -1223,7 +1223,7 @@ pub struct Gauge {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
         "x-unit" = "m",
-        "x-range" = "in the domain; `x` or `y` as in `from`",
+        "x-range" = "in the domain",
         "x-default" = "none, with `on`",
         "examples" = [[1.1, 0.5]]
     ))]
@@ -1231,7 +1231,7 @@ pub struct Gauge {
     /// Direction in which crossing counts as positive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(
-        "x-range" = "across the segment",
+        "x-range" = "across the line",
         "x-default" = "none, with `on`",
         "examples" = ["down"]
     ))]
@@ -1374,10 +1374,10 @@ pub struct Dye {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DyeGrid {
-    /// Range along x: x0 and upper end.
+    /// Range along x: lower and upper end.
     #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [[0, 2]]))]
     pub x: [Quantity; 2],
-    /// Range along y: y0 and upper end.
+    /// Range along y: lower and upper end.
     #[schemars(extend("x-unit" = "m", "x-range" = "any", "examples" = [[0, 1]]))]
     pub y: [Quantity; 2],
     /// Distance between lines.

@@ -114,7 +114,8 @@ impl SimError {
                  background material"
             }
             SimError::Solve { source: SolveError::Stalled { .. }, .. } => {
-                "raise accuracy.max_corrections or accuracy.tolerance, or lower the contrast"
+                "raise accuracy.max_corrections or accuracy.tolerance, or lower the contrast; between \
+                 solids, of which one moves, leave a gap of two cells or more, or raise accuracy.cells"
             }
             SimError::Solve { source: SolveError::Nonlinear { .. }, .. } => {
                 "likely cause: a step that changes the flow too much (lower time.tolerance), or a \

@@ -89,9 +89,9 @@ fn flow(
     let name = g.material.as_ref().ok_or_else(|| missing("material"))?;
     let line = line(what, from, to, scope, domain)?;
     if along(direction, &line) == 0.0 {
-        return Err(SceneError::at(
-            &from[0],
-            format!("{what}: its direction runs along the segment"),
+        return Err(SceneError::of_key(
+            format!("gauges[{k}].direction"),
+            format!("{what}: its direction runs along the gauge"),
             "a horizontal gauge counts `up` or `down`, a vertical one `left` or `right`, a slanted one \
              any of these",
         ));
