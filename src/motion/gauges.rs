@@ -82,11 +82,12 @@ impl Counter {
         background: Option<u8>,
     ) -> f64 {
         let state = State { mesh, flow, particles, background };
-        self.gauge.sign
-            * match self.gauge.line {
-                Line::Aligned(segment) => self.flux_along_mesh(segment, &state),
-                Line::Slanted(ends) => self.flux_across_cells(ends, &state),
-            }
+        let flux = match self.gauge.line {
+            Line::Aligned(segment) => self.flux_along_mesh(segment, &state),
+            Line::Slanted(ends) => self.flux_across_cells(ends, &state),
+        };
+        // The sum makes a negative zero positive.
+        0.0 + self.gauge.sign * flux
     }
 
     /// Flux along the normal of a segment on mesh lines.
