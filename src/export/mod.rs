@@ -131,12 +131,11 @@ pub fn write(frames: &Frames, format: Format, folder: &Path) -> Result<usize, Ex
         let number = path.file_name().and_then(|name| number(name.to_str()?, format));
         let stale = number.is_some_and(|n| n >= frames.instants.len());
         // Other files with such names are not ours.
-        let ours = |kind| replace::may_replace(&path, kind).is_ok();
-        if stale
-            && [Kind::Vtk, Kind::Table("x,y,"), Kind::Table("surface,along,")]
-                .map(ours)
-                .contains(&true)
-        {
+        let ours = || {
+            let kinds = [Kind::Vtk, Kind::Table("x,y,"), Kind::Table("surface,along,")];
+            kinds.into_iter().any(|kind| replace::may_replace(&path, kind).is_ok())
+        };
+        if stale && ours() {
             std::fs::remove_file(&path).map_err(fault)?;
         }
     }

@@ -98,8 +98,7 @@ impl Counter {
         let (across, along) = mesh.axes(normal);
         let line = across.nearest_line(at);
         let (first, last) = (along.nearest_line(from), along.nearest_line(to));
-        let below =
-            if line > 0 { Some(line - 1) } else { across.periodic().then(|| across.cells() - 1) };
+        let below = across.before(line);
         let above = (line < across.cells()).then_some(line);
         let cell = |m: Option<usize>, k: usize| m.map(|m| mesh.cell_across(normal, m, k));
         let mut flux = 0.0;

@@ -11,9 +11,9 @@
 //! On a straight wall this velocity is exactly zero, and since `d` is of the size of a cell where `q`
 //! is approximated, it is of third order. Corners inside of the solid count too: `q` is continued
 //! there. Along walls that slip this holds for the normal component; the nodes keep their tangential
-//! velocity. On a solid that moves, all this holds for the velocity relative to it. All conditions are linear relations of the nodes of one cell, so matrices stay positive
-//! definite and are assembled cell by cell, and no cell is too small: the flow depends on `q`, not on
-//! the volume that is left of a cell.
+//! velocity. On a solid that moves, all this holds for the velocity relative to it. All conditions are
+//! linear relations of the nodes of one cell, so matrices stay positive definite and are assembled cell by
+//! cell, and no cell is too small: the flow depends on `q`, not on the volume that is left of a cell.
 //!
 //! Each cell with a solid in it has a constant pressure; with a linear one it would have more
 //! conditions than velocities. Measured: drag of a square array of cylinders (Sangani and Acrivos
@@ -59,8 +59,8 @@ const NONE: u32 = u32::MAX;
 const IDENTITY: Map = [[1.0, 0.0], [0.0, 1.0]];
 
 impl Embedding {
-    /// The relations of the nodes of a mesh; `given(node, c)` is the velocity that other boundary
-    /// conditions prescribe.
+    /// The relations of the nodes of a mesh; `given(node, c)` is the velocity, or the rotation for `c = 2`,
+    /// that other boundary conditions prescribe.
     pub fn new(mesh: &Mesh, parts: &Parts, given: impl Fn(usize, usize) -> Option<f64>) -> Self {
         let scale = unit(mesh);
         let mut sites: Vec<Option<Site>> = (0..mesh.nodes()).map(|_| None).collect();
@@ -103,7 +103,9 @@ impl Embedding {
             }
             out.nodes.push(relation);
         }
-        out.leave_idle(&sites);
+        if parts.move_on() {
+            out.leave_idle(&sites);
+        }
         out.cells = (0..mesh.cells()).map(|cell| out.map_of(mesh, cell)).collect();
         out
     }
@@ -269,8 +271,8 @@ fn unit(mesh: &Mesh) -> f64 {
         + size(mesh.y.cells() as f64, mesh.y.length()))
 }
 
-/// Components of the velocity and rotation (2) of nodes on outlines along mesh lines that are those of the solid: nodes
-/// of free cells without a part, with the component and its value.
+/// Components of the velocity and the rotation (component 2) of nodes on outlines along mesh lines that are
+/// those of the solid: nodes of free cells without a part, with the component and its value.
 pub fn aligned(
     mesh: &Mesh,
     parts: &Parts,

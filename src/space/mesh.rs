@@ -130,6 +130,16 @@ impl Axis {
         if on_next && cell + 2 < self.lines.len() { cell + 1 } else { cell }
     }
 
+    /// The cell before a cell, perhaps across a periodic side.
+    pub fn before(&self, cell: usize) -> Option<usize> {
+        if cell > 0 { Some(cell - 1) } else { self.periodic.then(|| self.cells() - 1) }
+    }
+
+    /// The cell after a cell, perhaps across a periodic side.
+    pub fn after(&self, cell: usize) -> Option<usize> {
+        if cell + 1 < self.cells() { Some(cell + 1) } else { self.periodic.then_some(0) }
+    }
+
     /// The coordinate nearest to `x` that is not beyond an end; `x` itself on a periodic axis.
     #[inline(always)]
     fn nearest_inside(&self, x: f64) -> f64 {
@@ -347,18 +357,16 @@ impl Mesh {
     pub fn nearest_inside(&self, p: [f64; 2]) -> [f64; 2] {
         [self.x.nearest_inside(p[0]), self.y.nearest_inside(p[1])]
     }
+
     /// The cell beyond a side of a cell (left, right, bottom, top); `None` beyond the domain.
     pub fn beyond(&self, cell: usize, side: usize) -> Option<usize> {
         let (i, j) = self.cell_ij(cell);
-        let (axis, k) = if side < 2 { (&self.x, i) } else { (&self.y, j) };
-        let last = axis.cells() - 1;
-        let next = match (side % 2, k) {
-            (0, 0) => axis.periodic.then_some(last)?,
-            (0, _) => k - 1,
-            _ if k == last => axis.periodic.then_some(0)?,
-            _ => k + 1,
-        };
-        Some(if side < 2 { self.cell(next, j) } else { self.cell(i, next) })
+        match side {
+            0 => Some(self.cell(self.x.before(i)?, j)),
+            1 => Some(self.cell(self.x.after(i)?, j)),
+            2 => Some(self.cell(i, self.y.before(j)?)),
+            _ => Some(self.cell(i, self.y.after(j)?)),
+        }
     }
 
     /// The cells that share a corner with a cell, including itself and periodic neighbours; at most
@@ -366,12 +374,9 @@ impl Mesh {
     pub fn block(&self, cell: usize) -> impl Iterator<Item = usize> + use<'_> {
         let (i, j) = self.cell_ij(cell);
         let near = |axis: &Axis, k: usize| {
-            let last = axis.cells() - 1;
-            let below = if k > 0 { Some(k - 1) } else { axis.periodic.then_some(last) };
-            let above = if k < last { Some(k + 1) } else { axis.periodic.then_some(0) };
             // A periodic axis of one or two cells has no third cell.
-            let below = below.filter(|&b| b != k);
-            let above = above.filter(|&a| a != k && Some(a) != below);
+            let below = axis.before(k).filter(|&b| b != k);
+            let above = axis.after(k).filter(|&a| a != k && Some(a) != below);
             [below, Some(k), above]
         };
         let (x, y) = (near(&self.x, i), near(&self.y, j));

@@ -42,13 +42,7 @@ pub fn open_faces(mesh: &Mesh, enclosure: &Enclosure) -> Vec<Face> {
         for normal in 0..2 {
             let (axis, _) = mesh.axes(normal);
             let [k, along] = if normal == 0 { [i, j] } else { [j, i] };
-            let next = if k + 1 < axis.cells() {
-                k + 1
-            } else if axis.periodic() {
-                0
-            } else {
-                continue;
-            };
+            let Some(next) = axis.after(k) else { continue };
             let other = mesh.cell_across(normal, next, along);
             let at = [axis.lines()[k + 1], axis.lines()[next]];
             let middle = mesh.cell_centre(cell)[1 - normal];

@@ -241,9 +241,8 @@ impl Population {
         )
     }
 
-    /// Refills an empty cell with half of the largest particle of its neighbours, if there is one.
-    /// Puts half of a neighbour's largest particle into an empty cell. `None` if no neighbour has any, or if
-    /// the free part of the cell is too small to hold one.
+    /// Refills an empty cell with half of the largest particle of its neighbours. `None` if they have none, or
+    /// if the free part of the cell is too small to hold one.
     fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> Option<Refill> {
         let donor = cheapest(
             self.neighbours.of(cell).flat_map(|n| particles.of_cell(n).map(move |p| (n, p))).map(

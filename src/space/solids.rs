@@ -64,14 +64,15 @@ impl Mesh {
                 self.solid[cell] = true;
                 continue;
             }
+            let cut = fraction < 1.0 - WHOLE || unresolved;
+            if !cut && !parts.move_on() {
+                continue;
+            }
             // What lies on a side moves with its solid, so that the side is not free.
             let on_side = parts.move_on().then_some(ON_SIDE * hx.min(hy));
             let sides = std::array::from_fn(|side| side_rule(side, on_side, distance));
-            let touched = || {
-                let free = |rule: &Vec<Weighted>| rule.iter().map(|(_, w)| w).sum::<f64>();
-                on_side.is_some() && sides.iter().any(|rule| free(rule) < 1.0 - TOUCHED)
-            };
-            if fraction < 1.0 - WHOLE || unresolved || touched() {
+            let free = |rule: &Vec<Weighted>| rule.iter().map(|(_, w)| w).sum::<f64>();
+            if cut || sides.iter().any(|rule| free(rule) < 1.0 - TOUCHED) {
                 let part = part(measure, (fraction, rule), &sides, unresolved);
                 parts.cells[cell] = Some(Box::new(part));
             }

@@ -13,6 +13,9 @@ fn channel(sides: &str, block: &str) -> String {
     )
 }
 
+const CLOSED: &str = "[boundaries]\nright.kind = \"no_slip\"\nleft.kind = \"no_slip\"\n\
+    bottom.kind = \"no_slip\"\ntop.kind = \"no_slip\"\n";
+
 const OPEN: &str = "[boundaries]\nright.kind = \"outflow\"\nleft.kind = \"free_slip\"\n";
 
 /// Outflow through the right side, m2/s, by Simpson's rule in each cell, which is exact.
@@ -85,14 +88,12 @@ fn a_gate_drags_the_fluid_beside_it() {
 
 #[test]
 fn a_stone_that_moves_through_fluid_displaces_none() {
-    let sides = "[boundaries]\nright.kind = \"no_slip\"\nleft.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
-                 top.kind = \"no_slip\"\n";
     for kind in ["no_slip", "free_slip"] {
         let stone = format!(
             "shape.circle = {{ centre = [0.6, 0.5], radius = 0.22 }}\nkind = \"{kind}\"\n\
              velocity = [\"0.2*(t < 2)\", \"0.05*sin(3*t)\"]\n"
         );
-        let mut run = scene(&channel(sides, &stone), &["time.max_step=0.2"]);
+        let mut run = scene(&channel(CLOSED, &stone), &["time.max_step=0.2"]);
         let first = volume(run.as_ref());
         let free = 2.0 - std::f64::consts::PI * 0.22f64.powi(2);
         assert!((first / free - 1.0).abs() < 1e-3);
@@ -110,15 +111,15 @@ fn a_stone_that_moves_through_fluid_displaces_none() {
 
 #[test]
 fn a_block_may_pass_mesh_lines_and_slide_along_walls() {
-    let sides = "[boundaries]\nright.kind = \"no_slip\"\nleft.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
-                 top.kind = \"no_slip\"\n[[walls]]\nname = \"floor\"\nfrom = [1.25, 0.5]\nto = [2, 0.5]\n";
+    let floor = "[[walls]]\nname = \"floor\"\nfrom = [1.25, 0.5]\nto = [2, 0.5]\n";
+    let sides = format!("{CLOSED}{floor}");
     for kind in ["no_slip", "free_slip"] {
         // All its edges lie on mesh lines at the start; its top slides along the wall.
         let gate = format!(
             "shape.polygon = [[0.5, 0.25], [1, 0.25], [1, 0.5], [0.5, 0.5]]\nkind = \"{kind}\"\n\
              velocity = [0.125, 0]\n"
         );
-        let mut run = scene(&channel(sides, &gate), &["time.max_step=0.5"]);
+        let mut run = scene(&channel(&sides, &gate), &["time.max_step=0.5"]);
         let first = volume(run.as_ref());
         assert!((first / (2.0 - 0.125) - 1.0).abs() < 1e-12, "{first}");
         while run.row().time < 2.0 {

@@ -150,12 +150,13 @@ impl Forms<'_> {
 
     fn polygon(&self, corners: &[[Quantity; 2]]) -> Option<Form> {
         let points = corners.iter().map(|p| self.pair(p)).collect::<Option<Vec<_>>>()?;
-        let grips = (0..points.len()).map(|k| grip(format!("corner {}", k + 1), &[k], None));
-        let slots = (0..2 * points.len()).map(|k| {
+        let count = points.len();
+        let grips = (0..count).map(|k| grip(format!("corner {}", k + 1), &[k], None));
+        let slots = (0..2 * count).map(|k| {
             let keys = [Step::Key("shape"), Step::Key("polygon"), Step::Index(k / 2)];
             component(&keys, k % 2, k / 2, k % 2)
         });
-        Some((points.clone(), grips.collect(), slots.collect()))
+        Some((points, grips.collect(), slots.collect()))
     }
 
     fn circle(&self, centre: &[Quantity; 2], radius: &Quantity) -> Option<Form> {

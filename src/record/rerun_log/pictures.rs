@@ -35,6 +35,24 @@ pub(super) struct Look {
     pub(super) colours: Option<Vec<Color>>,
 }
 
+/// Points of two or three dimensions, which are different types, with a [`Look`].
+macro_rules! with_look {
+    ($points:expr, $look:expr) => {{
+        let mut points = $points;
+        if let Some(classes) = &$look.classes {
+            points = points.with_class_ids(classes.iter().copied());
+        }
+        if let Some(radii) = &$look.radii {
+            points = points.with_radii(radii.iter().copied());
+        }
+        if let Some(colours) = &$look.colours {
+            points = points.with_colors(colours.iter().copied());
+        }
+        points
+    }};
+}
+pub(super) use with_look;
+
 impl RerunLog {
     pub(super) fn scalar(&self, scalar: &Scalar) -> Result<(), RecordError> {
         self.rec.log(self.paths.at(&scalar.path), &archetypes::Scalars::single(scalar.value))?;
@@ -101,18 +119,9 @@ impl RerunLog {
 
     pub(super) fn particles(&mut self, particles: &ParticleSnapshot) -> Result<Look, RecordError> {
         let look = self.look(particles)?;
-        let mut points = archetypes::Points2D::update_fields()
-            .with_positions(particles.positions.iter().copied());
-        if let Some(classes) = &look.classes {
-            points = points.with_class_ids(classes.iter().copied());
-        }
-        if let Some(radii) = &look.radii {
-            points = points.with_radii(radii.iter().copied());
-        }
-        if let Some(colours) = &look.colours {
-            points = points.with_colors(colours.iter().copied());
-        }
-        self.rec.log(self.paths.at("world/particles"), &points)?;
+        let places = particles.positions.iter().copied();
+        let points = archetypes::Points2D::update_fields().with_positions(places);
+        self.rec.log(self.paths.at("world/particles"), &with_look!(points, look))?;
         Ok(look)
     }
 

@@ -8,7 +8,7 @@
 //! Particles are those of the flat view. Dyed lines become surfaces of few points; their triangles are
 //! recorded again only when the number of lines changes.
 
-use super::pictures::{Look, on_scale};
+use super::pictures::{Look, on_scale, with_look};
 use super::*;
 use crate::frame::{Outline, Ring, Snapshot};
 use crate::plan::boundary::SIDES;
@@ -117,17 +117,8 @@ impl RerunLog {
     ) -> Result<(), RecordError> {
         for (name, azimuth) in ["round/first", "round/second"].into_iter().zip([0.0, SWEPT]) {
             let places = snapshot.particles.positions.iter().map(|&p| turned(p, azimuth));
-            let mut points = archetypes::Points3D::update_fields().with_positions(places);
-            if let Some(classes) = &look.classes {
-                points = points.with_class_ids(classes.iter().copied());
-            }
-            if let Some(radii) = &look.radii {
-                points = points.with_radii(radii.iter().copied());
-            }
-            if let Some(colours) = &look.colours {
-                points = points.with_colors(colours.iter().copied());
-            }
-            self.rec.log(self.paths.at(name), &points)?;
+            let points = archetypes::Points3D::update_fields().with_positions(places);
+            self.rec.log(self.paths.at(name), &with_look!(points, look))?;
         }
         self.round_dye(&snapshot.dye_lines)?;
         self.round_rotation(&snapshot.rings)
