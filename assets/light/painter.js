@@ -15,8 +15,8 @@
 "use strict";
 
 const THEMES = {
-  light: { ground: "#ffffff", paper: "#f5f5f2", ink: "#1d2430", soft: "#5c6675", wall: "#26262a", dye: "#14141e", gauge: "#b04a00" },
-  dark: { ground: "#1c2027", paper: "#14171c", ink: "#e6e9ee", soft: "#9aa4b2", wall: "#d5d9e0", dye: "#e8eaf0", gauge: "#ff9b4d" },
+  light: { ground: "#ffffff", paper: "#f5f5f2", ink: "#1d2430", soft: "#5c6675", wall: "#26262a", dye: "#14141e", gauges: ["#b04a00", "#0b5c96", "#00694d", "#97407a", "#6a5a00", "#4b4fb5"] },
+  dark: { ground: "#1c2027", paper: "#14171c", ink: "#e6e9ee", soft: "#9aa4b2", wall: "#d5d9e0", dye: "#e8eaf0", gauges: ["#ff9b4d", "#62b5f0", "#3fcf9f", "#e9a0c9", "#e6cf3c", "#a9acff"] },
 };
 
 // What is drawn. `colour` is "material" or the name of a field; `field` the name of a field behind
@@ -140,7 +140,7 @@ function paint(surface, description, frame, moment, look, rect, unit) {
   for (const side of sides) {
     for (const wall of description.walls) surface.line(map(wall.points.flat(), side, Y), 2.5 * unit, theme.wall);
     for (const outline of frame.moving) surface.line(map(outline, side, Y), 2.5 * unit, theme.wall);
-    if (look.gauges) for (const gauge of description.gauges) surface.line(map(gauge.points.flat(), side, Y), 3 * unit, theme.gauge);
+    if (look.gauges) for (const [k, gauge] of description.gauges.entries()) surface.line(map(gauge.points.flat(), side, Y), 3 * unit, gaugeColour(theme, k));
   }
   surface.unclip();
   paintAxes(surface, place, description, theme, unit);
@@ -223,6 +223,11 @@ function paintHead(surface, description, moment, { left, right, top }, theme, un
   if (surface.measure(title, size) <= room) surface.text(title, left, top + 18 * unit, size, theme.ink, "start");
 }
 
+// Colour of gauge k in its line and in the key.
+function gaugeColour(theme, k) {
+  return theme.gauges[k % theme.gauges.length];
+}
+
 // Draws what the colours mean below the picture: a colour bar, or materials and gauges.
 function paintKey(surface, description, frame, look, { left, right, bottom }, place, theme, unit) {
   const size = 11 * unit;
@@ -233,7 +238,7 @@ function paintKey(surface, description, frame, look, { left, right, bottom }, pl
     const shown = description.materials.filter((m) => m.drawn);
     if (shown.length > 1 || !field) entries.push(...shown.map((m) => [m.name, `rgb(${m.rgb.join(",")})`, 5]));
   }
-  if (look.gauges) entries.push(...description.gauges.map((g) => [g.name, theme.gauge, 1.5]));
+  if (look.gauges) entries.push(...description.gauges.map((g, k) => [g.name, gaugeColour(theme, k), 1.5]));
   let x = left;
   const end = right;
   if (field) {

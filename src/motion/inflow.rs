@@ -189,10 +189,10 @@ impl Inflow {
                 }
             }
             let [from, through] = [-inside, 0.0].map(|inside| point(inside, middle));
-            if let Some(part) = mesh.part(cell)
-                && mesh.is_solid_in(cell, at)
-            {
-                at = mesh.free_place(cell, part).unwrap_or(at);
+            if mesh.is_solid_in(cell, at) {
+                let place = mesh.part(cell).and_then(|part| mesh.free_place(cell, part));
+                at = place.or_else(|| mesh.nearest_free(at)).unwrap_or(at);
+                cell = mesh.locate(at);
             }
             let volume = volume / parts;
             add(Entry { cell, material, volume, at, from, through, carried });
@@ -246,7 +246,7 @@ impl Inflow {
             }
         }
         if let Some(p) = nearest {
-            particles.absorb(p, new);
+            particles.absorb(mesh, cell, (p, new));
             particles.pop();
         }
     }

@@ -8,8 +8,8 @@ use super::sources::{Entering, Source};
 use super::{Matter, Units};
 use crate::scene::{FieldFn, SceneError, WallKind};
 use crate::space::constraints::Constraints;
-use crate::space::mesh::Mesh;
-use crate::space::parts::Parts;
+use crate::space::mesh::{Axis, Mesh};
+use crate::space::parts::{Parts, Solid};
 use crate::space::segment::Segment;
 use crate::space::shape::{SIDE_NODES, side_normal};
 
@@ -300,6 +300,13 @@ pub(super) fn boundary(
         }
     }
     let solids: Vec<_> = walls.solids.iter().map(|s| slips.of(s)).collect();
+    // Solids that move may be outside of the domain.
+    let inside = |s: &Solid| {
+        let [x, y] = s.outline.extent();
+        let meets = |[low, high]: [f64; 2], axis: &Axis| low < axis.end() && high > axis.start();
+        meets(x, &mesh.x) && meets(y, &mesh.y)
+    };
+    let in_mesh = || mesh.parts().into_iter().flat_map(|parts| &parts.solids).filter(|s| inside(s));
     let held = |c: usize| {
         let holds = |p: &Piece| {
             let slips = p.conditions.slip.is_some() && p.segment.normal != c;
@@ -307,10 +314,8 @@ pub(super) fn boundary(
         };
         pieces(&sides).any(|(_, p)| holds(p))
             || lines.iter().any(|w| w.segment.normal == c || w.no_slip || w.slip.is_some())
-            || mesh
-                .parts()
-                .is_some_and(|parts| parts.solids.iter().any(|s| s.no_slip || s.outline.holds(c)))
-            || solids.iter().any(Option::is_some)
+            || in_mesh().any(|s| s.no_slip || s.outline.holds(c))
+            || in_mesh().count() > 0 && solids.iter().any(Option::is_some)
     };
     // Inertia determines the velocity of a body that nothing holds.
     // No flow around an axis is a translation along the radius.

@@ -73,6 +73,13 @@ pub enum Warning {
         /// Share of the flowing volume, mean over the run.
         share: f64,
     },
+    /// Cells beside solids did not keep their volume.
+    LooseCells {
+        /// Number of solutions with such cells.
+        solutions: u64,
+        /// Largest number of such cells in one of them.
+        cells: u64,
+    },
     /// The weight of the background drives a flow through an opening.
     Draft {
         /// The opening, as its key in the scene.
@@ -155,6 +162,13 @@ impl fmt::Display for Warning {
                 f,
                 "the domain is far from zero: positions are computed, recorded and exported \
                  relative to its lower left corner ({x}, {y}) m"
+            ),
+            Warning::LooseCells { solutions, cells } => write!(
+                f,
+                "in {}, up to {} beside solids did not keep the volume: leave gaps of two cells or more \
+                 between solids, above all beside those that move, or raise accuracy.cells",
+                crate::words::count(*solutions, "solution"),
+                crate::words::count(*cells, "cell"),
             ),
             Warning::IllPosed { share } => write!(
                 f,

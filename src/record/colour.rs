@@ -22,6 +22,13 @@ pub const OKABE_ITO: [[u8; 3]; 7] = [
     [0, 0, 0],
 ];
 
+/// The colour of the gauge with this index: of its line, its name and its curves.
+pub fn of_gauge(index: usize) -> [u8; 3] {
+    // The first is vermilion, which stands out against grains.
+    const ORDER: [usize; 6] = [1, 0, 2, 3, 5, 4];
+    OKABE_ITO[ORDER[index % ORDER.len()]]
+}
+
 /// Every eighth entry of matplotlib's `viridis` (CC0), dark to bright.
 const VIRIDIS: [[u8; 3]; 33] = [
     [68, 1, 84],

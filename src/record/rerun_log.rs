@@ -101,7 +101,6 @@ mod depth {
 }
 
 const WALL: [u8; 3] = [38, 38, 42];
-const GAUGE: [u8; 3] = [213, 94, 0];
 const DYE: [u8; 3] = [20, 20, 30];
 const GLYPH: [u8; 3] = [10, 10, 14];
 const LINE: [u8; 3] = [20, 20, 24];

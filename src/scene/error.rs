@@ -22,7 +22,6 @@ const MAX_LINE: usize = 400;
 /// that `miette` shows the line and [`SceneError::one_line`] names it.
 #[derive(Clone, Debug, Diagnostic, Error)]
 #[error("{message}")]
-#[diagnostic(code(grainscope::scene))]
 pub struct SceneError {
     message: Box<str>,
     #[help]

@@ -206,6 +206,9 @@ fn quoted(message: &str) -> impl Iterator<Item = &str> {
     message.split('`').skip(1).step_by(2)
 }
 
+/// Label of an unknown key.
+const NO_KEY: &str = "not a key of this table";
+
 /// Translates a message of serde into the terms of scene files.
 fn translate(e: &toml::de::Error) -> SceneError {
     let said = e.message();
@@ -220,7 +223,8 @@ fn translate(e: &toml::de::Error) -> SceneError {
         let parent = table.and_then(|t| t.strip_suffix(name)?.strip_suffix('.'));
         let within = parent.map(|t| format!(" in `{t}`")).unwrap_or_default();
         let help = suggestion(name, "keys are", &known);
-        (format!("unknown key `{name}`{within}"), help, "not a key of this table")
+        let label = if parent.is_some() { NO_KEY } else { "not a key of a scene" };
+        (format!("unknown key `{name}`{within}"), help, label)
     } else if said.starts_with("unknown variant") {
         let help = suggestion(name, "choices are", &known);
         (format!("unknown choice `{name}`{within}"), help, "not a choice")
@@ -234,13 +238,24 @@ fn translate(e: &toml::de::Error) -> SceneError {
         let known: Vec<_> = known.split(", ").collect();
         let key = keys.split(", ").next().unwrap_or_default();
         let help = suggestion(key, "keys are", &known);
-        (format!("unknown key `{key}`{within}"), help, "not a key of this table")
+        (format!("unknown key `{key}`{within}"), help, NO_KEY)
     } else if said.starts_with("wanted exactly 1 element") {
         let help = "give exactly one of the choices".to_owned();
         (format!("a choice is needed{within}"), help, "not one choice")
     } else if let Some((found, wanted)) = said.rsplit_once(", expected ") {
-        let wanted = plain(wanted);
-        (format!("{found}{within}"), format!("expected {wanted}"), "this value")
+        let found = found.replacen("invalid type: ", "", 1).replacen("invalid value: ", "", 1);
+        let (shown, label) = match found.as_str() {
+            "map" => ("a table", "this table"),
+            "sequence" => ("a list", "this list"),
+            other => (other, "this value"),
+        };
+        let header = table.unwrap_or("...");
+        let remedy = match (found.as_str(), wanted) {
+            ("map", "a sequence") => format!(": write `[[{header}]]` instead of `[{header}]`"),
+            ("sequence", "a map") => format!(": write `[{header}]` instead of `[[{header}]]`"),
+            _ => String::new(),
+        };
+        (format!("{shown}{within}"), format!("expected {}{remedy}", plain(wanted)), label)
     } else {
         (format!("{said}{within}"), String::new(), "here")
     };
@@ -341,6 +356,7 @@ mod tests {
         schema = 1 | schema = 2 | 2 | schema 2 is not known | reads `schema = 1`
         schema = 1 | schema = "1" | "1" | not a whole number | reads `schema = 1`
         schema = 1 | # | no place | does not say `schema = 1` | as the first line
+        [[gauges]] | [gauges] | [gauges | a table in `gauges` | write `[[gauges]]` instead of `[gauges]`
         gravity | schema = 1\ngravity | schema | duplicate key | remove one
         [time] | [time | no place | not TOML | TOML syntax
         parameters.coupling | parameters.alpha | alpha | duplicate key | remove one

@@ -71,10 +71,18 @@ pub const CRITERIA: Criteria = Criteria {
 pub const FLOW_CURVES: Criteria =
     Criteria { power: 1e-2, divergence: 1e-7, corrections: 200.0, ..CRITERIA };
 
+/// The bounds of scenes with blocks that move: a solution is repeated where cells beside them turn out not to
+/// keep their volume.
+pub const MOVING: Criteria = Criteria { corrections: 200.0, ..CRITERIA };
+
 impl Criteria {
     /// The bounds of a plan. The power of generalised fluids is as exact as the default of
     /// `accuracy.nonlinear_tolerance`.
     pub fn of(plan: &Plan) -> &'static Criteria {
-        if plan.effects.flow_curves { &FLOW_CURVES } else { &CRITERIA }
+        match (plan.effects.flow_curves, plan.moving.is_empty()) {
+            (true, _) => &FLOW_CURVES,
+            (false, false) => &MOVING,
+            (false, true) => &CRITERIA,
+        }
     }
 }

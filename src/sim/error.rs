@@ -54,7 +54,7 @@ pub enum SimError {
         fault: Fault,
     },
     /// The blocks that move make the flow impossible.
-    #[error("step {step}, t = {time:.6e} s: {}", source.one_line())]
+    #[error("step {step}, t = {time:.6e} s: {}", source.headline())]
     Blocks {
         /// Number of the step.
         step: u64,
@@ -106,9 +106,12 @@ impl SimError {
     }
 
     /// What the user can do about the error.
-    pub fn remedy(&self) -> &'static str {
+    pub fn remedy(&self) -> &str {
         match self {
-            SimError::Unfilled(_) => "see the message",
+            SimError::Unfilled(_) => {
+                "extend a region, or give a material `background = true`: a flow without inertia needs a \
+                 material everywhere"
+            }
             SimError::Empty { .. } => {
                 "lower time.courant, raise accuracy.particles_per_cell, or give the scene a \
                  background material"
@@ -134,7 +137,9 @@ impl SimError {
                 "likely cause: a speed that grows without bound; look at the last frames, and \
                  lower accuracy.cells or the contrast"
             }
-            SimError::Blocks { .. } => "see the message",
+            SimError::Blocks { source, .. } => {
+                source.remedy().unwrap_or("change the block's velocity")
+            }
             SimError::Trapped { .. } => {
                 "stop the block before it closes (velocity = \"v*(t < t_end)\"), leave an opening, or give \
                  the material a bulk_viscosity"

@@ -23,8 +23,8 @@ pub enum Fault {
         /// Position of the value.
         place: Place,
     },
-    /// A particle is outside the domain.
-    #[error("a particle is outside the domain, {place}")]
+    /// A particle is outside the domain or inside of a solid.
+    #[error("a particle is outside the domain or inside of a solid, {place}")]
     Outside {
         /// The particle.
         place: Place,

@@ -27,10 +27,7 @@ const CENTRED: f64 = 1e-15;
 
 /// Error: a point of the domain lies in no region, and there is no background material.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "nothing fills the scene at x = {x:.6e}, y = {y:.6e}: a flow without inertia needs a material \
-     everywhere; extend a region, or give a material `background = true`"
-)]
+#[error("nothing fills the scene at x = {x:.6e}, y = {y:.6e}")]
 pub struct Unfilled {
     /// Coordinate x, m.
     pub x: f64,

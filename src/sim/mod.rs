@@ -115,6 +115,10 @@ impl<const D: usize> Run for Simulation<D> {
         if let Some(dye) = self.dye.as_ref().filter(|d| d.is_full()) {
             list.push(Warning::DyeCoarse { points: dye.points() });
         }
+        let [solutions, cells] = self.loosened;
+        if solutions > 0 && self.step > 0 {
+            list.push(Warning::LooseCells { solutions, cells });
+        }
         let [ill_posed, flowed] = self.flowed;
         if ill_posed > ILL_POSED * flowed {
             list.push(Warning::IllPosed { share: ill_posed / flowed });

@@ -19,7 +19,6 @@ use crate::solve::quadrature::Quadrature;
 use crate::solve::stokes::Stokes;
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::{Neighbours, open_faces};
-use crate::space::outline::{Obstacle, push_out};
 use crate::space::particles::Particles;
 use crate::space::population::Population;
 use crate::space::shape::side_point;
@@ -195,10 +194,10 @@ impl<const D: usize> Simulation<D> {
     pub(super) fn clear_solids(&mut self) {
         let mesh = self.plan.mesh.clone();
         clear(&mesh, &mut self.particles);
-        let Some(parts) = mesh.parts() else { return };
         for p in self.dye.iter_mut().flat_map(|dye| dye.lines.iter_mut().flatten()) {
-            if parts.is_solid(*p) {
-                *p = mesh.nearest_inside(mesh.wrap(push_out(parts.obstacles([0.0; 2]), *p)));
+            let inside = mesh.wrap(*p);
+            if !mesh.holds(inside) {
+                *p = mesh.nearest_free(inside).unwrap_or(*p);
             }
         }
     }
@@ -206,15 +205,13 @@ impl<const D: usize> Simulation<D> {
 
 /// Moves particles that are inside of a solid to the nearest place outside, and sorts them.
 pub(super) fn clear(mesh: &Mesh, particles: &mut Particles) {
-    let Some(parts) = mesh.parts() else { return };
+    if mesh.parts().is_none() {
+        return;
+    }
     for cell in (0..mesh.cells()).filter(|&c| mesh.solid[c] || mesh.part(c).is_some()) {
         for p in particles.of_cell(cell) {
-            let place = particles.position[p];
-            if parts.is_solid(place) {
-                let free =
-                    push_out(parts.solids.iter().map(|s| Obstacle::at_rest(&s.outline)), place);
-                particles.position[p] = mesh.nearest_inside(mesh.wrap(free));
-            }
+            let place = &mut particles.position[p];
+            *place = mesh.nearest_free(*place).unwrap_or(*place);
         }
     }
     particles.sort(mesh);

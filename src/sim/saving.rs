@@ -219,6 +219,9 @@ impl<const D: usize> Simulation<D> {
         if self.plan.has_friction() {
             s.put_floats("flowed", self.flowed);
         }
+        if self.loosened[0] > 0 {
+            s.put_counts("loosened", self.loosened);
+        }
         s.put_floats("baseline", self.baseline.iter().copied());
         s.put_floats("other_power", [self.last_other_power]);
         save_row(&self.row, s);
@@ -307,6 +310,7 @@ impl<const D: usize> Simulation<D> {
             Some(_) => s.numbers("flowed")?,
             None => [0.0; 2],
         };
+        let loosened = s.tally("loosened").unwrap_or_default();
         let tolerated = s.floats("tolerated")?.first().copied();
         let baseline = s.exactly("baseline", materials)?;
         let [last_other_power] = s.numbers("other_power")?;
@@ -340,6 +344,7 @@ impl<const D: usize> Simulation<D> {
         self.tolerated = tolerated;
         self.first_energy = first_energy;
         self.flowed = flowed;
+        self.loosened = loosened;
         self.recent_energy = recent_energy;
         let entering = self.inflow.iter().flat_map(|i| i.cells_of_interest(plan.background()));
         self.interest.update(mesh, self.quadrature.composition(), plan.background(), entering);

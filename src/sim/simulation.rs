@@ -99,6 +99,9 @@ pub struct Simulation<const D: usize> {
     /// Time integrals of volumes, in the plan's units: of the grains that flow at an inertial number
     /// outside the well-posed range and have no internal length, and of all grains that flow.
     pub(super) flowed: [f64; 2],
+    /// Number of solutions with cells that did not keep their volume, and the largest number of such
+    /// cells.
+    pub(super) loosened: [u64; 2],
     /// Potential energy at the start, J/m.
     pub(super) first_energy: f64,
     /// What has crossed the sides and is not yet counted.
@@ -188,6 +191,7 @@ impl<const D: usize> Simulation<D> {
             baseline: vec![],
             last_other_power: 0.0,
             flowed: [0.0; 2],
+            loosened: [0; 2],
             first_energy: 0.0,
             crossings: Vec::new(),
             recent_energy: [0.0; 2],

@@ -65,6 +65,10 @@ impl<const D: usize> Simulation<D> {
             stokes.solve(quadrature, loads, stopping, flow)
         };
         self.report = solved.map_err(failed)?;
+        if self.report.loose > 0 {
+            let [solutions, cells] = self.loosened;
+            self.loosened = [solutions + 1, cells.max(self.report.loose as u64)];
+        }
         if !plan.forces.is_empty() {
             stokes.reactions(quadrature, loads, flow, &mut self.reactions);
         }

@@ -17,7 +17,7 @@ impl<const D: usize> Stokes<D> {
     /// Computes one correction from the residual.
     pub(super) fn correct(&mut self, quadrature: &Quadrature, work: &mut Work<D>) {
         let Work { residual, shares, skeleton, correction, .. } = work;
-        let Stokes { mesh, incidence, constraints, matrices, factor, .. } = self;
+        let Stokes { mesh, incidence, constraints, matrices, factor, loose, .. } = self;
         let free = |node: usize, mut force: [f64; D]| -> [f64; D] {
             (0..D).filter(|&c| constraints.is_fixed(node, c)).for_each(|c| force[c] = 0.0);
             force
@@ -90,10 +90,11 @@ impl<const D: usize> Stokes<D> {
             }
             let mass = mesh.cell_measure(cell).pressure_mass();
             let bdu = Divergence::new(mesh, cell).apply(&du);
+            let compliance = quadrature.compliance[cell] + loose.compliance(mesh, quadrature, cell);
             for q in 0..3 {
                 let dp = -matrix.penalty[q] * (residual.divergence[cell][q] + bdu[q]);
                 share.sums[q] = dp;
-                share.divergence[q] = bdu[q] + quadrature.compliance[cell] * mass[q] * dp;
+                share.divergence[q] = bdu[q] + compliance * mass[q] * dp;
             }
         });
         correction.pressure.resize(mesh.cells(), [0.0; 3]);

@@ -3,6 +3,7 @@
 use super::element::{
     CellBlocks, Centre, LOCAL, Matrix, Nodal, PointShape, condense, embed, mirror, pair,
 };
+use super::loose::{Loose, stiffness};
 use super::quadrature::Quadrature;
 use super::terms::pressure::Divergence;
 use super::terms::rotation::RotationModes;
@@ -76,6 +77,8 @@ pub struct Ingredients<'a, const D: usize> {
     pub quadrature: &'a Quadrature,
     /// Terms that only some scenes have.
     pub terms: &'a Terms,
+    /// Cells that may change their volume.
+    pub loose: &'a Loose,
 }
 
 impl<'a, const D: usize> Ingredients<'a, D> {
@@ -157,7 +160,7 @@ impl<const D: usize> Matrices<D> {
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
             // The penalty of a cell with a solid in it depends on its neighbours.
-            let alone = from.mesh.part(cell).is_none();
+            let alone = from.mesh.part(cell).is_none() && from.loose.is_empty();
             let known = content.is_constant() && content == *built_from && alone;
             if content != Content::Solid && !known {
                 let blocks = Self::NO_BLOCKS;
@@ -192,23 +195,11 @@ impl<const D: usize> Matrices<D> {
     }
 }
 
-/// Viscosity that resists the divergence of a cell. The unknowns of a cell with a solid in it are those
-/// of its neighbours, of which the most viscous counts: with the cell's own viscosity, thin fluid beside
-/// a solid and a heavy fluid takes too many corrections.
-fn stiffness(mesh: &Mesh, quadrature: &Quadrature, cell: usize) -> f64 {
-    let own = quadrature.mean_viscosity[cell];
-    if mesh.part(cell).is_none() {
-        return own;
-    }
-    let near = mesh.block(cell).filter(|&c| !mesh.solid[c]);
-    near.map(|c| quadrature.mean_viscosity[c]).fold(own, f64::max)
-}
-
 impl<const D: usize> Fresh<D> {
     /// Computes the matrix of the cell, without the terms on faces unless it has a map: those act on
     /// velocities, not on its unknowns.
     fn build(&mut self, from: Ingredients<D>) {
-        let Ingredients { mesh, incidence, constraints, quadrature, terms } = from;
+        let Ingredients { mesh, incidence, constraints, quadrature, terms, loose } = from;
         let cell = self.cell;
         let measure = mesh.cell_measure(cell);
         let size = measure.size;
@@ -257,7 +248,9 @@ impl<const D: usize> Fresh<D> {
             + if D == 3 { turning } else { 0.0 }
             + terms.inertia.resistance(cell, measure.volume(), size[0].max(size[1]));
         let penalty = if quadrature.flows(cell) { FLOWING_PENALTY } else { PENALTY };
-        let compliance = 1.0 / (penalty * viscosity) + quadrature.compliance[cell];
+        let compliance = 1.0 / (penalty * viscosity)
+            + quadrature.compliance[cell]
+            + loose.compliance(mesh, quadrature, cell);
         let divergence = Divergence::new(mesh, cell);
         self.matrix.penalty = mass.map(|m| 1.0 / (m * compliance));
         for (penalty, unknown) in self.matrix.penalty.iter_mut().zip(divergence.unknown()) {
@@ -285,6 +278,7 @@ impl<const D: usize> Fresh<D> {
         mirror::<D>(&mut k);
         if let Some(map) = map {
             embed::<D>(&mut k, map);
+            (0..2 * NODES).for_each(|i| k[i][i] *= 1.0 + loose.guard());
         }
         for (a, node) in incidence.nodes[cell].into_iter().enumerate() {
             for c in 0..D {

@@ -10,6 +10,7 @@ mod form;
 pub mod laminate;
 pub mod last_flow;
 mod local_laws;
+mod loose;
 pub mod matrices;
 pub mod multifrontal;
 pub mod nonlinear;

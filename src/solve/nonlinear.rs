@@ -151,15 +151,21 @@ impl<const D: usize> Stokes<D> {
         flow: &mut Flow<D>,
     ) -> Result<Report, SolveError> {
         let mut report = Report::default();
-        let mut work = std::mem::take(&mut self.work);
-        let outcome = self.newton(
-            quadrature,
-            matter,
-            (loads, stopping, most_updates),
-            (flow, &mut report, &mut work),
-        );
-        self.work = work;
-        outcome.map(|()| report)
+        loop {
+            let mut work = std::mem::take(&mut self.work);
+            let outcome = self.newton(
+                quadrature,
+                matter,
+                (loads, stopping, most_updates),
+                (flow, &mut report, &mut work),
+            );
+            let loosened = self.loosens(&outcome, DIVERGENCE, &work.residual);
+            self.work = work;
+            if !loosened {
+                report.loose = self.loose.count();
+                return outcome.map(|()| report);
+            }
+        }
     }
 
     fn newton(
@@ -237,8 +243,13 @@ impl<const D: usize> Stokes<D> {
                 // Next to rounding, the matrix without the derivatives is the safer one.
                 quadrature.softened = false;
                 self.assemble(quadrature, loads.terms);
+                let mut factored = self.factor.factorize(&self.matrices.blocks);
+                if factored.is_err() && self.may_be_dependent() {
+                    self.assemble(quadrature, loads.terms);
+                    factored = self.factor.factorize(&self.matrices.blocks);
+                }
                 quadrature.softened = true;
-                self.factor.factorize(&self.matrices.blocks).map_err(|e| self.explain(e))?;
+                factored.map_err(|e| self.explain(e))?;
             }
             report.seconds.factor += clock.elapsed().as_secs_f64();
             let clock = Instant::now();

@@ -1,6 +1,7 @@
 //! This module defines the discrete problem on one mesh and the vectors used to solve it.
 
 use super::element::Nodal;
+use super::loose::Loose;
 use super::matrices::Matrices;
 use super::multifrontal::Multifrontal;
 use super::quadrature::Quadrature;
@@ -40,6 +41,8 @@ pub struct Stokes<const D: usize> {
     pub(super) simd: Simd,
     /// Vectors of the corrections.
     pub(super) work: Work<D>,
+    /// Cells that may change their volume.
+    pub(super) loose: Loose,
 }
 
 /// Loads that drive a solution.

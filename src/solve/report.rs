@@ -59,6 +59,9 @@ pub struct Report {
     pub power_scale: f64,
     /// Number of rotation unknowns that some Cosserat material acts on.
     pub active_rotation: usize,
+    /// Number of cells beside solids whose volume the flow does not keep; see
+    /// [`loose`](super::loose).
+    pub loose: usize,
     /// Wall time of the parts of the solution.
     pub seconds: Seconds,
 }

@@ -146,7 +146,8 @@ impl<const D: usize> Stokes<D> {
         let weights = self.mesh.divergence_mass(cell);
         let relations = self.constraints.embedding();
         let pressure = flow.pressure[cell];
-        let compliance = quadrature.compliance[cell];
+        let compliance =
+            quadrature.compliance[cell] + self.loose.compliance(&self.mesh, quadrature, cell);
         let mut force = [[0.0; D]; NODES];
         divergence.add_transposed(&pressure, &mut force);
         let mut pressure_norm = 0.0;

@@ -27,6 +27,7 @@
 //! million times weaker along than across), a residual that is small relative to that coefficient
 //! leaves an error in the flow; a few more corrections reduce it to rounding.
 
+use super::loose::{Course, Loose};
 use super::matrices::{Ingredients, Matrices};
 use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
 use super::problem::{Given, NODE_GRAIN, Residual, Work};
@@ -48,6 +49,8 @@ use std::time::Instant;
 
 /// Relative tolerance of the balance of powers of a converged solution.
 const POWER_TOLERANCE: f64 = 1e-9;
+/// Largest residual that is taken for a rounding error beside solids.
+const ROUNDING: f64 = 1e-10;
 /// Change of the pressures that are continued into cells with solids, relative to the largest
 /// pressure, below which they are not continued again.
 const CONTINUED: f64 = 1e-5;
@@ -75,6 +78,7 @@ impl<const D: usize> Stokes<D> {
             inverse_diagonal: vec![[0.0; D]; mesh.nodes()],
             simd: Simd::used(),
             work: Work::default(),
+            loose: Loose::default(),
             mesh,
             constraints,
         }
@@ -122,22 +126,43 @@ impl<const D: usize> Stokes<D> {
         flow: &mut Flow<D>,
     ) -> Result<Report, SolveError> {
         let mut report = Report::default();
+        let mut course = self.has_moving_solids().then(Course::default);
+        loop {
+            let clock = Instant::now();
+            report.active_rotation = self.assemble(quadrature, loads.terms);
+            report.seconds.assemble += clock.elapsed().as_secs_f64();
+            let clock = Instant::now();
+            let factored = self.factor.factorize(&self.matrices.blocks);
+            report.seconds.factor += clock.elapsed().as_secs_f64();
+            if let Err(e) = factored {
+                if self.may_be_dependent() {
+                    continue;
+                }
+                return Err(self.explain(e));
+            }
+            let clock = Instant::now();
+            self.constraints.impose(&mut flow.velocity);
+            let mut work = std::mem::take(&mut self.work);
+            work.kept = 0;
+            let given = Given { quadrature, loads, stopping };
+            let outcome = self.iterate(&given, &mut course, flow, &mut report, &mut work);
+            let loosened = self.loosens(&outcome, stopping.tolerance, &work.residual);
+            self.work = work;
+            report.seconds.solve += clock.elapsed().as_secs_f64();
+            if loosened {
+                course = Some(Course::default());
+            } else if course.as_ref().is_none_or(|c| !c.has_stalled()) {
+                outcome?;
+                break;
+            } else {
+                // The divergence falls slowly, but no cell is the reason.
+                course = None;
+            }
+        }
         let clock = Instant::now();
-        report.active_rotation = self.assemble(quadrature, loads.terms);
-        report.seconds.assemble = clock.elapsed().as_secs_f64();
-        let clock = Instant::now();
-        self.factor.factorize(&self.matrices.blocks).map_err(|e| self.explain(e))?;
-        report.seconds.factor = clock.elapsed().as_secs_f64();
-        let clock = Instant::now();
-        self.constraints.impose(&mut flow.velocity);
-        let mut work = std::mem::take(&mut self.work);
-        work.kept = 0;
-        let outcome =
-            self.iterate(&Given { quadrature, loads, stopping }, flow, &mut report, &mut work);
-        self.work = work;
-        outcome?;
         self.constraints.remove_null_space(&self.mesh, flow);
-        report.seconds.solve = clock.elapsed().as_secs_f64();
+        report.seconds.solve += clock.elapsed().as_secs_f64();
+        report.loose = self.loose.count();
         Ok(report)
     }
 
@@ -185,6 +210,7 @@ impl<const D: usize> Stokes<D> {
     fn iterate(
         &mut self,
         given: &Given<D>,
+        course: &mut Option<Course>,
         flow: &mut Flow<D>,
         report: &mut Report,
         work: &mut Work<D>,
@@ -193,7 +219,7 @@ impl<const D: usize> Stokes<D> {
         let load = loads.nodal;
         let (mut further, mut continued) = (0, 0);
         // Number of corrections when the pressures were continued last.
-        let mut begun = 0;
+        let mut begun = report.corrections;
         flow.continue_slopes(&self.mesh, loads.weight, &quadrature.mean_viscosity);
         loop {
             self.residual(quadrature, loads, flow, work);
@@ -225,7 +251,13 @@ impl<const D: usize> Stokes<D> {
                     return Ok(());
                 }
                 further += 1;
-            } else if report.corrections - begun >= stopping.max_corrections {
+            } else if report.corrections - begun >= stopping.max_corrections
+                && self.is_rounding(report, &given.stopping)
+            {
+                return Ok(());
+            } else if report.corrections - begun >= stopping.max_corrections
+                || course.as_mut().is_some_and(|c| c.stalls(report.divergence, stopping.tolerance))
+            {
                 return Err(self.stalled(residual, report, stopping.tolerance));
             }
             self.correct(quadrature, work);
@@ -235,6 +267,44 @@ impl<const D: usize> Stokes<D> {
             self.apply(work, flow);
             report.corrections += 1;
         }
+    }
+
+    /// Whether solids move, so that a solution may exist only if some cells change their volume.
+    fn has_moving_solids(&self) -> bool {
+        self.mesh.parts().is_some_and(Parts::move_on)
+    }
+
+    /// After a factorisation that failed, whether another one may succeed, with unknowns beside solids that
+    /// are not taken to be independent.
+    pub(super) fn may_be_dependent(&mut self) -> bool {
+        self.mesh.parts().is_some() && self.loose.declare_dependent()
+    }
+
+    /// After corrections that have left more divergence than `tolerance`, lets the cells at solids with the
+    /// largest divergences change their volume; returns whether there are any that could not before.
+    pub(super) fn loosens(
+        &mut self,
+        outcome: &Result<(), SolveError>,
+        tolerance: f64,
+        residual: &Residual<D>,
+    ) -> bool {
+        match outcome {
+            Err(SolveError::Stalled { divergence, .. })
+                if *divergence > tolerance && self.mesh.parts().is_some() =>
+            {
+                self.loose.add_largest(&self.mesh, &residual.divergence)
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether only rounding keeps the residual from falling further: beside solids that leave slivers of
+    /// cells, rounding errors of large pressures are larger than elsewhere.
+    fn is_rounding(&self, report: &Report, stopping: &Stopping) -> bool {
+        self.mesh.parts().is_some()
+            && report.residual <= ROUNDING.max(stopping.tolerance)
+            && report.divergence <= stopping.tolerance
+            && report.power_error() <= POWER_TOLERANCE
     }
 
     /// Computes the element matrices of the cells that changed; returns the number of active
@@ -248,14 +318,15 @@ impl<const D: usize> Stokes<D> {
             factor,
             diagonal,
             inverse_diagonal,
+            loose,
             ..
         } = self;
-        let from = Ingredients { mesh, incidence, constraints, quadrature, terms };
+        let from = Ingredients { mesh, incidence, constraints, quadrature, terms, loose };
         matrices.update(from, |cell| factor.touch(cell));
         diagonal.fill([0.0; D]);
         incidence.add_up(diagonal, |cell, a| matrices.cells[cell].diagonal[a]);
         threads::for_each(inverse_diagonal, NODE_GRAIN, |node, inverse| {
-            *inverse = diagonal[node].map(|d| 1.0 / d);
+            *inverse = diagonal[node].map(|d| if d > 0.0 { 1.0 / d } else { 0.0 });
         });
         if D == 3 { diagonal.iter().filter(|d| d[D - 1] > 0.0).count() } else { 0 }
     }

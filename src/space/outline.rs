@@ -300,7 +300,7 @@ impl<'a> Obstacle<'a> {
     }
 
     /// Whether a point is inside at the end of the path.
-    fn contains(&self, p: Point) -> bool {
+    pub fn contains(&self, p: Point) -> bool {
         self.outline.contains(minus(p, self.displaced[1]))
     }
 

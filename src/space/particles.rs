@@ -314,17 +314,21 @@ impl Particles {
         }
     }
 
-    /// Merges particle `b` into particle `a`, which keeps its index; `b` is not removed. Volumes
-    /// add up, position and carried values are means weighted by volume, and directors are averaged
-    /// regardless of their sign.
-    pub fn absorb(&mut self, a: usize, b: usize) {
+    /// Merges particle `b` into particle `a` of a cell, which keeps its index; `b` is not removed.
+    /// Volumes add up, position (unless it is inside of a solid) and carried values are means weighted by
+    /// volume, and directors are averaged regardless of their sign.
+    pub fn absorb(&mut self, mesh: &Mesh, cell: usize, (a, b): (usize, usize)) {
         let (va, vb) = (self.volume[a], self.volume[b]);
         let (fa, fb) = (va / (va + vb), vb / (va + vb));
         self.volume[a] = va + vb;
+        let before = self.position[a];
         for c in 0..2 {
             let (x, y) = (self.position[a][c], self.position[b][c]);
             // By rounding, the mean of two points on a side of the domain may lie beyond it.
             self.position[a][c] = (fa * x + fb * y).clamp(x.min(y), x.max(y));
+        }
+        if mesh.is_solid_in(cell, self.position[a]) {
+            self.position[a] = before;
         }
         if let Some(d) = &mut self.director {
             let [p, q] = [d[a], d[b]];

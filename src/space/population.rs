@@ -275,7 +275,7 @@ impl Population {
             let mut members: Vec<usize> = particles.of_cell(cell).collect();
             while members.len() > most {
                 let Some((a, b)) = closest_pair(mesh, particles, cell, &members) else { break };
-                particles.absorb(a, b);
+                particles.absorb(mesh, cell, (a, b));
                 gone.resize(particles.len(), false);
                 gone[b] = true;
                 members.retain(|&p| p != b);

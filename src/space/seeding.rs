@@ -29,14 +29,13 @@ impl Seeding {
     }
 
     /// Positions of the particles in a cell. Those inside of solids are left out; if all are, there is
-    /// one at the centroid of the part that is free.
+    /// one in the part that is free, or none if that is too small to hold one.
     pub fn positions(&self, mesh: &Mesh, cell: usize, random: &mut Pcg64) -> Vec<[f64; 2]> {
         let mut all = self.lattice(mesh, cell, random);
         if let Some(part) = mesh.part(cell) {
             all.retain(|&p| !mesh.is_solid_in(cell, p));
             if all.is_empty() {
-                let centroid = || mesh.from_reference(cell, part.centroid());
-                all.push(mesh.free_place(cell, part).unwrap_or_else(centroid));
+                all.extend(mesh.free_place(cell, part));
             }
         }
         all

@@ -4,7 +4,7 @@
 use super::free_rule::{SQUARES, Weighted, reduced, rule, side_rule};
 use super::measure::CellMeasure;
 use super::mesh::Mesh;
-use super::outline::Point;
+use super::outline::{Point, push_out};
 use super::parts::{Part, PartPoint, Parts, Solid};
 use super::shape::{NODES, SIDE_NODES, Shape, side_end, side_normal};
 use super::stream_fit::fit;
@@ -22,6 +22,9 @@ const ON_SIDE: f64 = 2.0 * SOLID;
 
 /// Share of the side of a cell from which a solid that lies on it counts.
 const TOUCHED: f64 = 1e-6;
+
+/// Distance from an outline, relative to that of the node inside of the solid, up to which a point is on it.
+const ON_OUTLINE: f64 = 1e-6;
 
 /// Part of the side of a cell up to which what is given on it is taken as constant.
 const NARROW: f64 = 0.05;
@@ -159,13 +162,21 @@ impl Mesh {
         };
         let (_, along) = self.axes(normal);
         let line = along.nearest_line(at[1 - normal]);
-        let near = |line: usize| {
+        let reach = |line: usize| {
             let mut p = at;
             p[1 - normal] = *along.lines().get(line)?;
-            let d = parts.distance(p);
-            (d > 0.0).then_some((p, d))
+            Some((p, parts.distance(p)))
         };
-        let beside = [line.checked_sub(1).and_then(near), near(line + 1)];
+        let below = |k: usize| line.checked_sub(k).and_then(reach);
+        let above = |k: usize| reach(line + k);
+        // A point on the outline does not tell how the velocity grows with the distance: the next one does.
+        let near = |reach: &dyn Fn(usize) -> Option<(Point, f64)>| {
+            let first = reach(1)?;
+            let on_outline = first.1.abs() <= ON_OUTLINE * inside.abs();
+            let near = if on_outline { reach(2)? } else { first };
+            (near.1 > 0.0).then_some(near)
+        };
+        let beside = [near(&below), near(&above)];
         let Some((free, d)) = beside.into_iter().flatten().max_by(|a, b| a.1.total_cmp(&b.1))
         else {
             return 0.0;
@@ -198,6 +209,37 @@ impl Mesh {
         let free = points.filter(|&r| is_free(r));
         let nearest = free.min_by(|&a, &b| away(a).total_cmp(&away(b)));
         Some(self.from_reference(cell, nearest?))
+    }
+
+    /// A place near a point that is in the domain and not inside of a solid: the point itself, the nearest
+    /// place outside of the solids, or the nearest of those that the cells around it have; `None` if
+    /// everything is solid.
+    pub fn nearest_free(&self, p: Point) -> Option<Point> {
+        let Some(parts) = self.parts() else { return Some(p) };
+        if self.holds(p) {
+            return Some(p);
+        }
+        let outside = self.nearest_inside(self.wrap(push_out(parts.obstacles([0.0; 2]), p)));
+        if self.holds(outside) {
+            return Some(outside);
+        }
+        let middle = self.nearest_inside(self.wrap(p));
+        let (i, j) = self.cell_ij(self.locate(middle));
+        let place = |cell: usize| match self.part(cell) {
+            _ if self.solid[cell] => None,
+            Some(part) => self.free_place(cell, part),
+            None => Some(self.cell_centre(cell)),
+        };
+        let away = |q: &Point| (q[0] - middle[0]).hypot(q[1] - middle[1]);
+        let [nx, ny] = [self.x.cells(), self.y.cells()];
+        (0..nx.max(ny)).find_map(|ring| {
+            let near = |k: usize, n: usize| k.saturating_sub(ring)..(k + ring + 1).min(n);
+            let on_ring = |k: usize, l: usize| k.abs_diff(i).max(l.abs_diff(j)) == ring;
+            let cells = near(j, ny).flat_map(|l| near(i, nx).map(move |k| (k, l)));
+            let places =
+                cells.filter(|&(k, l)| on_ring(k, l)).filter_map(|(k, l)| place(self.cell(k, l)));
+            places.min_by(|a, b| away(a).total_cmp(&away(b)))
+        })
     }
 
     /// Whether two neighbours share a face.

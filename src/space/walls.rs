@@ -93,14 +93,18 @@ impl Enclosure {
                 if p0[wall.normal] >= wall.at { wall.at } else { wall.below(mesh).next_down() };
             held = true;
         }
-        if let Some(parts) = mesh.parts()
-            && let Some(end) = slide(parts.obstacles(times), p0, to)
-        {
-            (to, held) = (end, true);
-            for (c, axis) in [&mesh.x, &mesh.y].into_iter().enumerate() {
-                if !axis.periodic() {
-                    to[c] = to[c].clamp(axis.start(), axis.end());
-                }
+        if let Some(parts) = mesh.parts() {
+            if let Some(end) = slide(parts.obstacles(times), p0, to) {
+                (to, held) = (mesh.nearest_inside(end), true);
+            }
+            // Solids that move leave places later in which the mesh does not show them.
+            let blocked = if parts.move_on() {
+                held && parts.obstacles(times).any(|o| o.contains(to))
+            } else {
+                mesh.is_solid_at(mesh.wrap(to))
+            };
+            if blocked {
+                (to, held) = (p0, true);
             }
         }
         if held { Landing::Held(to) } else { Landing::Free(to) }

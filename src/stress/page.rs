@@ -1,7 +1,7 @@
 //! Formats the outcomes of the stress battery as a table, a documentation page and JSON.
 
 use super::{Outcome, Verdict};
-use crate::sim::criteria::{CRITERIA, Criteria, FLOW_CURVES};
+use crate::sim::criteria::{CRITERIA, Criteria, FLOW_CURVES, MOVING};
 use crate::verify::{Table, number};
 use serde::Serialize;
 
@@ -57,13 +57,15 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
          written to `stress-failures/`. The drift is not checked for materials smaller than a cell \
          and for those that change their volume or leave the domain. Fluids with flow curves (friction, yield \
          stress) have a power balance of at most {}, a divergence of at most {} and at most {} corrections: their \
-         iteration ends there by design. `cargo test` runs the quick \
+         iteration ends there by design. Scenes with blocks that move have at most {} corrections: solutions are \
+         repeated where cells cannot keep their volume. `cargo test` runs the quick \
          part.\n\n{} trials: {} pass, {} have a margin below {}, {} fail.\n\n{}",
         criteria.markdown(),
         number(c.margin),
         number(FLOW_CURVES.power),
         number(FLOW_CURVES.divergence),
         number(FLOW_CURVES.corrections),
+        number(MOVING.corrections),
         outcomes.len(),
         count(|v| *v == Verdict::Pass),
         count(|v| matches!(v, Verdict::Margin(_))),

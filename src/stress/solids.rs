@@ -1,4 +1,5 @@
-//! Defines the trials of solids of any shape: fifty random polygons in heavy fluid that falls past them.
+//! Defines the trials of solids of any shape: random polygons in heavy fluid that falls past them, at rest,
+//! with corners on lines of the mesh, and moving past others.
 
 use super::Trial;
 use super::trials::trial;
@@ -7,6 +8,12 @@ use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
 
 const GROUP: &str = "solids of any shape";
+
+/// Number of halves of cells per side of the domain.
+const HALVES: f64 = 24.0;
+
+/// The kind of trials whose first polygon moves to and fro.
+const MOVES: &str = "one that moves past another";
 
 type Polygon = Vec<[f64; 2]>;
 
@@ -59,6 +66,28 @@ fn polygons(kind: &str, random: &mut Pcg64) -> Vec<Polygon> {
             let at = centre(random);
             vec![star(random, at, 0.25), star(random, at, 0.15)]
         }
+        "corners on mesh lines" => {
+            // Halves of cells, from the middle.
+            let mut line = |middle: i32| f64::from(middle + random.random_range(-4..4)) / HALVES;
+            let corners = [0, 1, 2].map(|_| [line(12), line(11)]);
+            let area = |[a, b, c]: [[f64; 2]; 3]| {
+                (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+            };
+            if area(corners).abs() > 0.5 / (HALVES * HALVES) {
+                return vec![corners.into()];
+            }
+            // The corners are on one line: a rectangle instead.
+            let [x, y] = corners[0];
+            let [right, high] = [x + 3.0 / HALVES, y + 1.0 / HALVES];
+            vec![vec![[x, y], [right, y], [right, high], [x, high]]]
+        }
+        MOVES => {
+            let at = centre(random);
+            let first = star(random, at, 0.15);
+            let far = first.iter().map(|p| p[0]).fold(0.0, f64::max);
+            let gap = random.random_range(0.0..0.1);
+            vec![first, star(random, [far + gap + 0.15, at[1]], 0.15)]
+        }
         _ => {
             let at = centre(random);
             vec![star(random, at, 0.25)]
@@ -75,6 +104,8 @@ pub(super) fn trials(out: &mut Vec<Trial>) {
         ("smaller than a cell", 8),
         ("two that touch", 6),
         ("one in another", 8),
+        ("corners on mesh lines", 12),
+        (MOVES, 12),
     ];
     for (kind, count) in kinds {
         for number in 1..=count {
@@ -84,18 +115,28 @@ pub(super) fn trials(out: &mut Vec<Trial>) {
                 .enumerate()
                 .map(|(k, polygon)| {
                     let slip = if number % 2 == 0 { "no_slip" } else { "free_slip" };
+                    let moves = kind == MOVES && k == 0;
+                    let velocity =
+                        if moves { "velocity = [0, \"0.3*cos(t)\"]\n" } else { "" };
                     format!(
-                        "[[blocks]]\nname = \"solid_{k}\"\nkind = \"{slip}\"\nshape.polygon = {polygon:?}\n"
+                        "[[blocks]]\nname = \"solid_{k}\"\nkind = \"{slip}\"\nshape.polygon = \
+                         {polygon:?}\n{velocity}"
                     )
                 })
                 .collect();
             let contrast = [1.0, 1e3, 1e6][number as usize % 3];
+            // Blocks that overlap others change the volume that is left.
+            let open = if kind == MOVES {
+                "[boundaries]\ntop.kind = \"open\"\n"
+            } else {
+                ""
+            };
             let text = format!(
                 "schema = 1\nname = \"solids\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
                  [accuracy]\ncells = 12\nplacement = \"jittered\"\n[time]\nend = 1e9\n\
                  [materials.heavy]\ndensity = 1\nshear_viscosity = 1\n\
                  [materials.thin]\nshear_viscosity = {:e}\nbackground = true\n[[regions]]\n\
-                 material = \"heavy\"\nshape.where = \"y > 0.6\"\n{blocks}",
+                 material = \"heavy\"\nshape.where = \"y > 0.6\"\n{open}{blocks}",
                 1.0 / contrast
             );
             let mut one = trial(GROUP, format!("{kind}, number {number}"), text, 30).drifting();

@@ -183,7 +183,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
         })
         .collect();
     let gauges = gauges.into_iter().map(|g| g.scaled(&mesh, &units)).collect();
-    let (tracers, marks) = dye::dye(scene, scope, length, &units)?;
+    let (tracers, marks) = dye::dye(scene, scope, length, &units, (&mesh, &enclosure))?;
     let tracers = tracers.map(|t| dye::outside(t, &mesh));
     Ok(Plan {
         scene: whole.clone(),

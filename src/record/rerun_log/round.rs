@@ -79,7 +79,7 @@ fn colour([r, g, b, a]: [u8; 4]) -> rerun::components::AlbedoFactor {
 }
 
 impl RerunLog {
-    /// Records walls and gauges.
+    /// Records walls.
     pub(super) fn round_world(&mut self, info: &RunInfo) -> Result<(), RecordError> {
         self.rec
             .log_static(self.paths.at("round"), &archetypes::ViewCoordinates::RIGHT_HAND_Y_UP())?;

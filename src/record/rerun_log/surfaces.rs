@@ -3,6 +3,7 @@
 use super::read::{Recorded, seconds};
 use super::*;
 use crate::frame::{SurfacePoint, SurfaceStress};
+use crate::record::colour::of_gauge;
 use rerun::components::Radius;
 use rerun::{archetypes, components};
 
@@ -32,7 +33,7 @@ impl RerunLog {
             path.clone(),
             &archetypes::Arrows2D::from_vectors(arrows)
                 .with_origins(surface.points.iter().map(|p| p.at))
-                .with_colors([rgb(GAUGE)])
+                .with_colors([rgb(of_gauge(0))])
                 .with_radii([Radius::new_ui_points(0.8)])
                 .with_draw_order(depth::GAUGES),
         )?;

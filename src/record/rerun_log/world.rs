@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::frame::RunInfo;
-use crate::record::colour::OKABE_ITO;
+use crate::record::colour::{OKABE_ITO, of_gauge};
 use rerun::archetypes;
 use rerun::components::Radius;
 
@@ -52,7 +52,7 @@ impl RerunLog {
             self.rec.log_static(
                 self.paths.at("world/gauges"),
                 &archetypes::LineStrips2D::new(gauges.clone().map(|gauge| gauge.points.as_slice()))
-                    .with_colors([rgb(GAUGE)])
+                    .with_colors((0..info.gauges.len()).map(|k| rgb(of_gauge(k))))
                     .with_radii([Radius::new_ui_points(1.5)])
                     .with_draw_order(depth::GAUGES),
             )?;
@@ -65,7 +65,8 @@ impl RerunLog {
             if drawn.len() > 1 {
                 entries.extend(drawn.iter().map(|m| (m.name.as_str(), m.rgb)));
             }
-            entries.extend(info.gauges.iter().map(|gauge| (gauge.name.as_str(), GAUGE)));
+            let gauges = info.gauges.iter().enumerate();
+            entries.extend(gauges.map(|(k, gauge)| (gauge.name.as_str(), of_gauge(k))));
         }
         if !entries.is_empty() {
             let row = colour_bar::row(info.domain, entries.len());
@@ -118,14 +119,16 @@ impl RerunLog {
     /// Records the names and colours of the curves.
     pub(super) fn curves(&self, info: &RunInfo) -> Result<(), RecordError> {
         for plot in &info.plots {
-            for (series, color) in plot.series.iter().zip(OKABE_ITO.iter().cycle()) {
+            for (series, &color) in plot.series.iter().zip(OKABE_ITO.iter().cycle()) {
+                let of = |name: &str| series.path.starts_with(&format!("gauges/{name}/"));
+                let color = info.gauges.iter().position(|g| of(&g.name)).map_or(color, of_gauge);
                 let name =
                     if plot.log10 { format!("log10 {}", series.name) } else { series.name.clone() };
                 self.rec.log_static(
                     self.paths.curve(&series.path, plot.log10),
                     &archetypes::SeriesLines::new()
                         .with_names([name])
-                        .with_colors([rgb(on_dark(*color))])
+                        .with_colors([rgb(on_dark(color))])
                         .with_widths([1.75]),
                 )?;
             }
