@@ -116,8 +116,7 @@ pub(super) fn trials(out: &mut Vec<Trial>) {
                 .map(|(k, polygon)| {
                     let slip = if number % 2 == 0 { "no_slip" } else { "free_slip" };
                     let moves = kind == MOVES && k == 0;
-                    let velocity =
-                        if moves { "velocity = [0, \"0.3*cos(t)\"]\n" } else { "" };
+                    let velocity = if moves { "velocity = [0, \"0.3*cos(t)\"]\n" } else { "" };
                     format!(
                         "[[blocks]]\nname = \"solid_{k}\"\nkind = \"{slip}\"\nshape.polygon = \
                          {polygon:?}\n{velocity}"
@@ -126,11 +125,7 @@ pub(super) fn trials(out: &mut Vec<Trial>) {
                 .collect();
             let contrast = [1.0, 1e3, 1e6][number as usize % 3];
             // Blocks that overlap others change the volume that is left.
-            let open = if kind == MOVES {
-                "[boundaries]\ntop.kind = \"open\"\n"
-            } else {
-                ""
-            };
+            let open = if kind == MOVES { "[boundaries]\ntop.kind = \"open\"\n" } else { "" };
             let text = format!(
                 "schema = 1\nname = \"solids\"\ngravity = [0, -1]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
                  [accuracy]\ncells = 12\nplacement = \"jittered\"\n[time]\nend = 1e9\n\

@@ -132,6 +132,41 @@ fn a_block_may_pass_mesh_lines_and_slide_along_walls() {
 }
 
 #[test]
+fn blocks_pass_what_is_beside_them_in_gaps_narrower_than_a_cell() {
+    let open = "[boundaries]\ntop.kind = \"open\"\nleft.kind = \"no_slip\"\nright.kind = \"no_slip\"\n\
+                bottom.kind = \"no_slip\"\n";
+    let cell = 1.0 / 8.0;
+    for (share, kind) in [(0.2, "no_slip"), (0.5, "free_slip"), (0.8, "no_slip")] {
+        let gap = share * cell;
+        // A slope whose upper corner is on a side, a block beside that side, and a block on the ground.
+        let low = 0.25 + gap;
+        let moving = format!(
+            "shape.polygon = [[0.3, {low}], [0.8, {low}], [0.8, 0.6], [0.3, 0.6]]\n\
+             velocity = [\"0.4*(t < 2)\", \"0.1*(t > 2)\"]\nkind = \"{kind}\"\n\
+             [[blocks]]\nname = \"ground\"\nkind = \"{kind}\"\n\
+             shape.polygon = [[1, -1], [1.5, -1], [1.5, 0.25], [1, 0.25]]\n\
+             [[blocks]]\nname = \"slope\"\nkind = \"{kind}\"\n\
+             shape.polygon = [[-1, -1], [-1, 0.5], [0, 0.25], [0.25, 0], [0.25, -1]]\n\
+             [[blocks]]\nname = \"lift\"\nkind = \"{kind}\"\nvelocity = [0, 0.1]\n\
+             shape.polygon = [[{right}, 0.3], [{right}, 0.5], [1.6, 0.5], [1.6, 0.3]]",
+            right = 2.0 - gap,
+        );
+        let mut run = scene(&channel(open, &moving), &["time.max_step=0.25", "mesh.grading=[]"]);
+        let first = volume(run.as_ref());
+        let cells = run.plan().mesh.cells();
+        for _ in 0..14 {
+            run.step().unwrap();
+            assert_eq!(inside(run.as_ref()), 0, "{share} {kind}");
+            assert_eq!(run.plan().mesh.cells(), cells);
+            let row = run.row();
+            assert!(row.power_error < 1e-6, "{share} {kind}: {}", row.power_error);
+            let lost = first - volume(run.as_ref()) + row.volume_in - row.volume_out;
+            assert!(lost.abs() < 1e-12, "{share} {kind}: {lost}");
+        }
+    }
+}
+
+#[test]
 fn a_gate_holds_the_grains_until_it_opens() {
     let mut run = crate::preset("gate", &["accuracy.cells=4", "opens=0.05", "speed=2"]);
     let (mut leaked, mut steps) = (0.0, 0);
