@@ -73,6 +73,17 @@ pub enum Warning {
         /// Share of the flowing volume, mean over the run.
         share: f64,
     },
+    /// A gap beside a solid of any shape is narrower than the mesh can show.
+    NarrowGap {
+        /// Names of the solids, or of a solid and a side.
+        between: [String; 2],
+        /// A place beside it, m.
+        at: [f64; 2],
+        /// Its width, m.
+        width: f64,
+        /// Size of the cells there, m.
+        cell: f64,
+    },
     /// Cells beside solids did not keep their volume.
     LooseCells {
         /// Number of solutions with such cells.
@@ -162,6 +173,12 @@ impl fmt::Display for Warning {
                 f,
                 "the domain is far from zero: positions are computed, recorded and exported \
                  relative to its lower left corner ({x}, {y}) m"
+            ),
+            Warning::NarrowGap { between: [a, b], at: [x, y], width, cell } => write!(
+                f,
+                "the gap between `{a}` and `{b}` near ({x:.4}, {y:.4}) is {width:.3e} m wide, {:.1} of a cell: \
+                 the flow through it is uncertain, or it is closed; raise accuracy.cells, or make them touch",
+                width / cell,
             ),
             Warning::LooseCells { solutions, cells } => write!(
                 f,

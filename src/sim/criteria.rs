@@ -72,8 +72,8 @@ pub const FLOW_CURVES: Criteria =
     Criteria { power: 1e-2, divergence: 1e-7, corrections: 200.0, ..CRITERIA };
 
 /// The bounds of scenes with blocks that move: a solution is repeated where cells beside them turn out not to
-/// keep their volume.
-pub const MOVING: Criteria = Criteria { corrections: 200.0, ..CRITERIA };
+/// keep their volume, and particles that are pushed out of gaps narrower than a cell crowd beside them.
+pub const MOVING: Criteria = Criteria { corrections: 200.0, misplaced: 2.0, ..CRITERIA };
 
 impl Criteria {
     /// The bounds of a plan. The power of generalised fluids is as exact as the default of

@@ -22,14 +22,15 @@ const BULK: f64 = 1e3;
 const GUARD: f64 = 1e-12;
 
 /// Divergence of a cell, relative to the largest, from which it is one of these cells.
-const SHARE: f64 = 0.01;
+const SHARE: f64 = 0.1;
 
 /// Divergence, in units of the tolerance, up to which corrections that reduce it slowly go on.
 const SMALL: f64 = 1e3;
 
-/// Number of corrections in which the divergence must fall by the factor [`FALLS`].
-const CORRECTIONS: usize = 6;
-const FALLS: f64 = 0.3;
+/// Number of corrections that must reduce the divergence at least by the factor [`FALLS`]: where there is
+/// no solution, it hardly changes; where thin fluid is in a gap, it may fall slowly.
+const CORRECTIONS: usize = 12;
+const FALLS: f64 = 0.99;
 
 /// Divergences of the last corrections.
 #[derive(Default)]

@@ -57,8 +57,9 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
          written to `stress-failures/`. The drift is not checked for materials smaller than a cell \
          and for those that change their volume or leave the domain. Fluids with flow curves (friction, yield \
          stress) have a power balance of at most {}, a divergence of at most {} and at most {} corrections: their \
-         iteration ends there by design. Scenes with blocks that move have at most {} corrections: solutions are \
-         repeated where cells cannot keep their volume. `cargo test` runs the quick \
+         iteration ends there by design. Scenes with blocks that move have at most {} corrections, because \
+         solutions are repeated where cells cannot keep their volume, and a volume of cells of at most {}, because \
+         particles that are pushed out of gaps narrower than a cell crowd beside them. `cargo test` runs the quick \
          part.\n\n{} trials: {} pass, {} have a margin below {}, {} fail.\n\n{}",
         criteria.markdown(),
         number(c.margin),
@@ -66,6 +67,7 @@ pub fn markdown(outcomes: &[Outcome]) -> String {
         number(FLOW_CURVES.divergence),
         number(FLOW_CURVES.corrections),
         number(MOVING.corrections),
+        number(MOVING.misplaced),
         outcomes.len(),
         count(|v| *v == Verdict::Pass),
         count(|v| matches!(v, Verdict::Margin(_))),

@@ -175,10 +175,13 @@ fn a_gate_holds_the_grains_until_it_opens() {
         let row = run.row();
         assert!(row.max_speed < 10.0, "{} at {}", row.max_speed, row.time);
         if row.time <= 0.05 {
-            // A few grains creep into the gap; the gate carries about what is above it.
+            // Grains creep into the gap, which is 0.4 cells wide, until the gate carries what is above it.
+            // With 12 cells its share of that weight grows from 0.22 at the start to 0.94.
             leaked = row.gauges[0].volume;
             let share = row.forces[0].y / (-1500.0 * 9.81 * 0.2 * 0.1);
-            assert!(row.time == 0.0 || (0.5..1.5).contains(&share), "{share}");
+            let bounds = if row.time == 0.0 { 0.15..0.35 } else { 0.15..1.0 };
+            assert!(bounds.contains(&share), "{share} at {}", row.time);
+            assert!(row.time < 0.045 || share > 0.88, "{share} at {}", row.time);
             steps += 1;
         }
     });

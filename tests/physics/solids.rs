@@ -241,3 +241,30 @@ fn rotation_on_a_polygon_along_mesh_lines_is_that_on_a_rectangle() {
     let [_, _, on_block] = plain.velocity_at([0.25, 0.3]);
     assert!((on_block - 0.3).abs() < 1e-9, "{on_block}");
 }
+
+/// Openings between polygons, across the mesh and few cells wide, let through what they should.
+#[test]
+fn openings_between_polygons_are_open() {
+    let flux = |width: f64, cells: u32| {
+        let (low, rise) = (0.49, 0.15);
+        let high = low + width / 16.0;
+        let text = format!(
+            "schema = 1\nname = \"opening\"\n[domain]\nx = [0, 1]\ny = [0, 1]\n[accuracy]\n\
+             cells = {cells}\n[mesh]\ngrading = []\n[time]\nend = 1\n[boundaries]\n\
+             left = {{ kind = \"open\", traction_x = 1 }}\nright.kind = \"open\"\n\
+             bottom.kind = \"no_slip\"\ntop.kind = \"no_slip\"\n[materials.mud]\n\
+             shear_viscosity = 1\n[[regions]]\nmaterial = \"mud\"\nshape = \"everywhere\"\n\
+             [[gauges]]\nname = \"flux\"\nfrom = [0.9, 0]\nto = [0.9, 1]\ndirection = \"right\"\n\
+             material = \"mud\"\n[[blocks]]\nname = \"low\"\nkind = \"no_slip\"\nshape.polygon = \
+             [[0.3, -1], [0.7, -1], [0.7, {}], [0.3, {low}]]\n[[blocks]]\nname = \"high\"\n\
+             kind = \"no_slip\"\nshape.polygon = [[0.3, {high}], [0.7, {}], [0.7, 2], [0.3, 2]]\n",
+            low + rise,
+            high + rise,
+        );
+        scene(&text, &[]).row().gauges[0].rate
+    };
+    for (width, most) in [(3.0, 0.03), (2.0, 0.03), (1.3, 0.15)] {
+        let error = flux(width, 16) / flux(width, 128) - 1.0;
+        assert!(error.abs() < most, "{width} cells: {error}");
+    }
+}

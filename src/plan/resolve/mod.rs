@@ -7,6 +7,7 @@ mod corners;
 mod drafts;
 mod dye;
 mod flow_curves;
+mod gaps;
 mod gauges;
 mod inflow;
 mod materials;
@@ -108,6 +109,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
     let lines = mesh::Lines { walls: &walls, gauges: &gauges, sides: &sides, sources: &sources };
     let mesh = Arc::new(mesh::mesh(scene, scope, domain, length, &lines, &units)?);
     state.relaxation = schedule::relaxation(&state, &mesh, schedule::inertial(scene, &units));
+    warnings.extend(gaps::narrow(&walls, (domain, origin), &mesh, &units));
     let sources: Vec<_> = sources.into_iter().map(|s| s.scaled(&mesh, &units)).collect();
     let mut clock = time::clock(scene, scope, &units)?;
     sources::add_stops(&sources, &mut clock);
