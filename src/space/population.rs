@@ -241,22 +241,19 @@ impl Population {
         )
     }
 
-    /// Refills an empty cell with half of the largest particle of its neighbours. `None` if they have none, or
-    /// if the free part of the cell is too small to hold one.
+    /// Refills an empty cell with half of the largest particle of its neighbours, if possible one that is not
+    /// behind a solid. `None` if they have none, or if the free part of the cell is too small to hold one.
     fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> Option<Refill> {
-        let donor = cheapest(
-            self.neighbours.of(cell).flat_map(|n| particles.of_cell(n).map(move |p| (n, p))).map(
-                |(n, p)| {
-                    let middle = from_middle(mesh, particles.position[p]);
-                    (-particles.volume[p], middle, (n, p))
-                },
-            ),
-        )?;
-        let (from, donor) = donor;
         let place = match mesh.part(cell) {
             Some(part) => mesh.free_place(cell, part)?,
             None => mesh.cell_centre(cell),
         };
+        let near = self.neighbours.of(cell).flat_map(|n| particles.of_cell(n).map(move |p| (n, p)));
+        let (from, donor) = cheapest(near.map(|(n, p)| {
+            let at = particles.position[p];
+            let volume = if mesh.sees(place, at) { particles.volume[p] } else { 0.0 };
+            (-volume, from_middle(mesh, at), (n, p))
+        }))?;
         particles.volume[donor] *= 0.5;
         particles.duplicate(donor);
         let child = particles.len() - 1;

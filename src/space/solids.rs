@@ -4,7 +4,7 @@
 use super::free_rule::{SQUARES, Weighted, reduced, rule, side_rule};
 use super::measure::CellMeasure;
 use super::mesh::Mesh;
-use super::outline::{Point, push_out};
+use super::outline::{Point, push_out, slide};
 use super::parts::{Part, PartPoint, Parts, Solid};
 use super::shape::{NODES, SIDE_NODES, Shape, side_end, side_normal};
 use super::stream_fit::fit;
@@ -244,6 +244,11 @@ impl Mesh {
                 cells.filter(|&(k, l)| on_ring(k, l)).filter_map(|(k, l)| place(self.cell(k, l)));
             places.min_by(|a, b| away(a).total_cmp(&away(b)))
         })
+    }
+
+    /// Whether no solid of any shape is between two points.
+    pub fn sees(&self, a: Point, b: Point) -> bool {
+        self.parts().is_none_or(|parts| slide(parts.obstacles([0.0; 2]), a, b).is_none())
     }
 
     /// Whether two neighbours share a face.
