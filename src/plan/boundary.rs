@@ -315,7 +315,7 @@ pub(super) fn boundary(
         pieces(&sides).any(|(_, p)| holds(p))
             || lines.iter().any(|w| w.segment.normal == c || w.no_slip || w.slip.is_some())
             || in_mesh().any(|s| s.no_slip || s.outline.holds(c))
-            || in_mesh().count() > 0 && solids.iter().any(Option::is_some)
+            || in_mesh().next().is_some() && solids.iter().any(Option::is_some)
     };
     // Inertia determines the velocity of a body that nothing holds.
     // No flow around an axis is a translation along the radius.

@@ -65,9 +65,9 @@ pub struct Loose {
 }
 
 impl Loose {
-    /// Whether there are none.
-    pub(super) fn is_empty(&self) -> bool {
-        self.cells.is_empty()
+    /// Whether a cell is among them.
+    pub(super) fn contains(&self, cell: usize) -> bool {
+        self.cells.get(cell).is_some_and(|&loose| loose)
     }
 
     /// Relative addition to the diagonal of the factored matrix where unknowns are not velocities.
@@ -88,10 +88,7 @@ impl Loose {
 
     /// Additional inverse bulk viscosity of a cell.
     pub(super) fn compliance(&self, mesh: &Mesh, quadrature: &Quadrature, cell: usize) -> f64 {
-        match self.cells.get(cell) {
-            Some(true) => 1.0 / (BULK * stiffness(mesh, quadrature, cell)),
-            _ => 0.0,
-        }
+        if self.contains(cell) { 1.0 / (BULK * stiffness(mesh, quadrature, cell)) } else { 0.0 }
     }
 
     /// Adds the cells at solids with the largest divergences; returns whether there are any that were not

@@ -160,7 +160,7 @@ impl<const D: usize> Matrices<D> {
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
             // The penalty of a cell with a solid in it depends on its neighbours.
-            let alone = from.mesh.part(cell).is_none() && from.loose.is_empty();
+            let alone = from.mesh.part(cell).is_none() && !from.loose.contains(cell);
             let known = content.is_constant() && content == *built_from && alone;
             if content != Content::Solid && !known {
                 let blocks = Self::NO_BLOCKS;

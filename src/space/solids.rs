@@ -33,8 +33,8 @@ const NARROW: f64 = 0.05;
 /// solid that the nodes see, for the solid to be thinner than the mesh can show.
 const LOST: f64 = 0.02;
 
-/// Part of a solid in a cell that may be lost. At corners a little of it always is; cells that are closed for
-/// that let only two thirds of the flow through an opening three cells wide.
+/// Part of a solid in a cell that may be lost. At corners a little of it always is; if cells were closed for
+/// that, openings a few cells wide would be too (test `openings_between_polygons_are_open`).
 const MOST_LOST: f64 = 1.0 / 3.0;
 
 impl Mesh {

@@ -14,11 +14,9 @@ impl Walls {
     /// Corners of polygons that touch no other solid, and of blocks along mesh lines. Solids that move do not
     /// count, so that the mesh does not depend on where they are.
     pub(super) fn corners(&self, [x, y]: [[f64; 2]; 2]) -> Vec<Corner> {
-        let moves = |name: &str| self.moving.iter().any(|m| m.name == name);
         let mut out = Vec::new();
         let tiny = 1e-9 * (x[1] - x[0]).max(y[1] - y[0]);
-        let at_rest = || self.solids.iter().enumerate().filter(|(_, s)| !moves(&s.name));
-        for (index, solid) in at_rest() {
+        for (index, solid) in self.at_rest().enumerate() {
             let Outline::Polygon(corners) = &solid.outline else { continue };
             // Measured: lines through corners of two solids that touch each other can take three times the
             // corrections.
@@ -27,7 +25,7 @@ impl Walls {
                 let theirs = if let Outline::Polygon(theirs) = o { &theirs[..] } else { &[] };
                 near(corners, o) || near(theirs, &solid.outline)
             };
-            let mut others = at_rest().filter(|(k, _)| *k != index);
+            let mut others = self.at_rest().enumerate().filter(|(k, _)| *k != index);
             if others.any(|(_, o)| touches(&o.outline)) {
                 continue;
             }

@@ -192,6 +192,12 @@ impl Walls {
         Ok(Walls { walls, blocks, solids, moving, poses: current })
     }
 
+    /// Solids of any shape that do not move.
+    pub(super) fn at_rest(&self) -> impl Iterator<Item = &SiSolid> + Clone {
+        let moves = |s: &SiSolid| self.moving.iter().any(|m| m.name == s.name);
+        self.solids.iter().filter(move |s| !moves(s))
+    }
+
     /// The lips of apertures: ends of walls that face each other across a gap. (Additional grading
     /// towards the upper ends of the silo's side walls takes 1.6 times the cells and changes the
     /// initial discharge by 1e-5.)
