@@ -103,6 +103,48 @@ pub fn speed_over_plate(y: f64, t: f64) -> f64 {
     1.0 - 2.0 / PI.sqrt() * integral * h / 3.0
 }
 
+/// Densities, viscosities and micro-inertia of [`turning_wave`]: eta, eta_c, M and j, with a density of 1.
+const TURNING: [f64; 4] = [0.05, 0.1, 2e-3, 0.2];
+
+/// A wave of shear and rotation that decays, up to t = 2: `u = u(t) cos ky`, `w = w(t) sin ky` with
+/// `k = pi` between walls without friction on which the rotation is zero, in a Cosserat fluid whose
+/// rotation has inertia. It starts with the rotation of its spin.
+pub fn turning_wave(resolution: Resolution) -> SceneSource {
+    let [eta, coupling, couple, j] = TURNING;
+    let period = 4.0 / f64::from(resolution.cells);
+    scene(
+        "turning_wave",
+        &format!("[domain]\nx = [0, {period:?}]\ny = [0, 1]\nlength_scale = 1"),
+        resolution.until(2.0),
+        &format!(
+            "[materials.grains]\ndensity = 1\nshear_viscosity = {eta:?}\ncoupling_viscosity = \
+             {coupling:?}\ncouple_viscosity = {couple:?}\nmicro_inertia = {j:?}\n[[regions]]\nmaterial = \
+             \"grains\"\n[initial_velocity]\nx = \"cos(pi*y)\"\ny = 0\n[boundaries]\nleft.kind = \
+             \"periodic\"\nright.kind = \"periodic\"\nbottom.rotation = 0\ntop.rotation = 0\n"
+        ),
+    )
+}
+
+/// Velocity and rotation of [`turning_wave`] at a time, `u(t)` and `w(t)`, from
+///
+/// ```text
+/// rho u' = -(eta + eta_c) k^2 u + 2 eta_c k w
+/// rho j w' = 2 eta_c k u - (M k^2 + 4 eta_c) w,   u(0) = 1, w(0) = k/2
+/// ```
+pub fn motion_of_turning_wave(t: f64) -> [f64; 2] {
+    let [eta, coupling, couple, j] = TURNING;
+    let a = -(eta + coupling) * PI * PI;
+    let b = 2.0 * coupling * PI;
+    let d = -(couple * PI * PI + 4.0 * coupling) / j;
+    // Both rates of decay are real: the product of the couplings is positive.
+    let (mean, half) = (0.5 * (a + d), (0.25 * (a - d).powi(2) + b * b / j).sqrt());
+    let start = [1.0, 0.5 * PI];
+    // exp(A t) = exp(mean t) (cosh(half t) + (A - mean) sinh(half t)/half).
+    let [c, s] = [(half * t).cosh(), (half * t).sinh() / half];
+    let of = [a * start[0] + b * start[1], b / j * start[0] + d * start[1]];
+    [0, 1].map(|k| (mean * t).exp() * (c * start[k] + s * (of[k] - mean * start[k])))
+}
+
 /// A standing wave of wavelength 1 and amplitude 0.01 on water of depth 0.5 under air, with gravity
 /// 1, half a wavelength wide, over a free-slip floor. `resolution`: cells per half wavelength.
 pub fn standing_wave(resolution: Resolution) -> SceneSource {
@@ -142,6 +184,21 @@ pub fn cavity(cells: u32) -> SceneSource {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_motion_of_the_turning_wave_follows_its_equations() {
+        let [eta, coupling, couple, j] = TURNING;
+        let h = 1e-5;
+        for t in [0.0, 0.3, 1.7] {
+            let [u, w] = motion_of_turning_wave(t);
+            let [before, after] = [t - h, t + h].map(motion_of_turning_wave);
+            let [du, dw] = [0, 1].map(|c| (after[c] - before[c]) / (2.0 * h));
+            let force = -(eta + coupling) * PI * PI * u + 2.0 * coupling * PI * w;
+            let torque = 2.0 * coupling * PI * u - (couple * PI * PI + 4.0 * coupling) * w;
+            assert!((du - force).abs() < 1e-8 && (j * dw - torque).abs() < 1e-8, "{t}");
+        }
+        assert_eq!(motion_of_turning_wave(0.0), [1.0, 0.5 * PI]);
+    }
 
     #[test]
     fn the_speed_over_the_plate_is_that_of_the_error_function() {

@@ -352,6 +352,7 @@ material = "sand"
     /// What else the box needs before a key can be set: parts of the key's path, `--set` argument.
     const NEEDED: &[(&str, &str)] = &[
         ("initial_velocity.", "inertia=true"),
+        ("micro_inertia", "inertia=true"),
         ("mesh.grading[0].factor", "mesh.grading=[{ towards = \"walls\", factor = 2 }]"),
         ("mesh.grading[0].towards", "mesh.grading=[{ towards = \"walls\", factor = 2 }]"),
         ("mesh.grading[0].towards.x", "mesh.grading=[{ towards = { x = 1 }, factor = 2 }]"),
@@ -444,6 +445,8 @@ material = "sand"
             ""
         } else if any(&["friction.", "cohesion"]) {
             "friction = { static = 0.3, grain_diameter = 1e-3 }"
+        } else if any(&["micro_inertia"]) {
+            "shear_viscosity = 100\ncoupling_viscosity = 50\ninternal_length = 0.1"
         } else if any(&["layer_internal_length"]) {
             "shear_viscosity = 100\nlayer_viscosity = 1\ncoupling_viscosity = 50\ninternal_length = 0"
         } else if any(&["granular."]) {

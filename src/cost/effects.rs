@@ -36,7 +36,7 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
         EffectKind::Rotation => {
             for m in s.materials.values_mut() {
                 (m.internal_length, m.couple_viscosity) = (None, None);
-                m.layer_internal_length = None;
+                (m.layer_internal_length, m.micro_inertia) = (None, None);
             }
             let b = &mut s.boundaries;
             for side in [&mut b.left, &mut b.right, &mut b.bottom, &mut b.top] {
@@ -66,6 +66,9 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
         EffectKind::Acceleration | EffectKind::CutCells => return None,
         EffectKind::CarriedViscosity | EffectKind::CarriedDensity => return None,
         EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => return None,
+        EffectKind::MicroInertia => {
+            s.materials.values_mut().for_each(|m| m.micro_inertia = None);
+        }
         EffectKind::Slip | EffectKind::Inflow => return None,
         EffectKind::Solids | EffectKind::Moving => return None,
     }

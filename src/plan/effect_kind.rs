@@ -35,6 +35,8 @@ pub enum EffectKind {
     PressureZero,
     /// Inertia.
     Inertia,
+    /// Inertia of the rotation.
+    MicroInertia,
     /// Slip along walls.
     Slip,
     /// Material that enters through sides and nozzles.
@@ -66,6 +68,7 @@ impl EffectKind {
             FlowCurves => "flow curves",
             PressureZero => "the zero of the pressure",
             Inertia => "inertia",
+            MicroInertia => "inertia of the rotation",
             Slip => "slip at walls",
             Inflow => "inflow",
             Solids => "solids of any shape",

@@ -317,8 +317,11 @@ impl Plan {
         add(FlowCurves, e.flow_curves, why(e.flow_curves, self.curves(), no), 0, 0, &[stage]);
         let (given, reason) = self.zero_of_pressure();
         add(PressureZero, given, reason, 0, 0, &[]);
-        let yes = "`inertia = true`; the rotation of grains has no inertia".to_string();
+        let yes = "`inertia = true`".to_string();
         add(Inertia, e.inertia, why(e.inertia, yes, self.no_inertia()), 0, 0, &["momentum"]);
+        let (turns, yes) = (e.micro_inertia, self.micro_inertia());
+        let no = self.no_micro_inertia();
+        add(MicroInertia, turns, why(turns, yes, no), 0, 0, &["momentum of the rotation"]);
         let slips = self.slips();
         let no = "no side, wall or block has slip_length or wall_friction";
         add(Slip, !slips.is_empty(), why(!slips.is_empty(), slips, no), 0, 0, &[]);

@@ -16,6 +16,8 @@ pub struct Material {
     pub density: f64,
     /// Particles carry their own density.
     pub carries_density: bool,
+    /// Micro-inertia j of the rotation; zero without.
+    pub micro_inertia: f64,
     /// Constitutive law.
     pub law: Law,
     /// Whether the material fills the part of the domain outside all regions.

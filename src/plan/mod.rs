@@ -162,6 +162,8 @@ pub struct EffectSet {
     pub flow_curves: bool,
     /// Inertia acts on the materials with density.
     pub inertia: bool,
+    /// Inertia acts on the rotation too.
+    pub micro_inertia: bool,
 }
 
 /// A part of the domain (SI coordinates) and the material that fills it at the start.

@@ -66,6 +66,27 @@ impl Plan {
         if self.scene.inertia { "nothing has a density" } else { "creeping flow" }
     }
 
+    /// The materials whose rotation has inertia.
+    pub(super) fn micro_inertia(&self) -> String {
+        let states = std::iter::once(&self.state).chain(self.changes.iter().map(|c| &c.state));
+        let mut names = vec![];
+        for m in states.flat_map(|s| &s.materials).filter(|m| m.micro_inertia > 0.0) {
+            if !names.contains(&m.name.as_str()) {
+                names.push(m.name.as_str());
+            }
+        }
+        format!("micro_inertia: {}", names.join(", "))
+    }
+
+    /// Why the rotation has no inertia.
+    pub(super) fn no_micro_inertia(&self) -> &'static str {
+        match (self.effects.rotation, self.effects.inertia) {
+            (false, _) => "no rotation",
+            (true, false) => "creeping flow",
+            (true, true) => "no material has micro_inertia: the rotation follows without delay",
+        }
+    }
+
     /// The places along which material slips, with the laws there; empty if there are none.
     pub(super) fn slips(&self) -> String {
         let law = |law: &WallLaw| match law {

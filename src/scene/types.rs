@@ -339,6 +339,16 @@ pub struct Material {
         "examples" = [0.1]
     ))]
     pub couple_viscosity: Option<Quantity>,
+    /// Micro-inertia j of the rotation in a scene with inertia, rho j dw/dt: the moment of inertia of the
+    /// rotating grains per mass, d^2/8 for discs and d^2/10 for spheres of the diameter d.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-unit" = "m2",
+        "x-range" = "≥ 0",
+        "x-default" = "the rotation has no inertia",
+        "examples" = [1e-6]
+    ))]
+    pub micro_inertia: Option<Quantity>,
     /// Viscosity eta_s of shear along the layers, whose normal is the director.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend(

@@ -13,14 +13,19 @@
 //! sudden change of the materials, a step is of first order, `rho (u - u_1)/dt`. The velocities are
 //! biquadratic and are tested against the shape functions, which is third order in space, and no
 //! particle carries momentum: splits, merges and refills cannot change it. O. Pironneau, "On the
-//! transport-diffusion algorithm", Numer. Math. 38 (1982) 309.
+//! transport-diffusion algorithm", Numer. Math. 38 (1982) 309. Where a material has a micro-inertia, its
+//! rotation is traced in the same way.
 
 use crate::motion::frozen_flow::{CellVelocities, Displacement, FrozenFlow};
 use crate::plan::Plan;
+use crate::plan::material::Material;
 use crate::solve::density::Density;
+use crate::solve::quadrature::Quadrature;
 use crate::solve::terms::inertia::{Inertia as Term, Mass};
-use crate::space::flow::{Flow, interpolate};
+use crate::space::flow::{Flow, gradient, interpolate};
 use crate::space::mesh::Mesh;
+use crate::space::neighbours::Neighbours;
+use crate::space::particles::Particles;
 use crate::space::shape::{NODES, SUBPOINTS, Shape};
 use crate::threads;
 
@@ -32,6 +37,8 @@ const GRAIN: usize = 16;
 pub struct Past {
     /// Nodal velocities at the start.
     pub velocity: Vec<[f64; 2]>,
+    /// Nodal rotations at the start; empty if they have no inertia.
+    pub rotation: Vec<[f64; 1]>,
     /// Nodal velocities at the middle.
     pub half: Vec<[f64; 2]>,
     /// Length of the step, in the plan's units.
@@ -40,25 +47,66 @@ pub struct Past {
     pub parts: u32,
 }
 
+/// Accelerations of the material at the nodes.
+#[derive(Clone, Debug)]
+pub struct Acceleration {
+    /// Acceleration.
+    pub velocity: Vec<[f64; 2]>,
+    /// Acceleration of the rotation; empty if it has no inertia.
+    pub rotation: Vec<[f64; 1]>,
+}
+
 /// The steps from which the inertial force follows.
 pub struct Inertia {
     /// Corrected velocities of the last two steps, backwards in time.
     backwards: [CellVelocities; 2],
     /// The last step, and the one before it.
     pub past: [Option<Past>; 2],
-    /// Accelerations of the material at the nodes, at the start of the first step; `None` later.
-    pub acceleration: Option<Vec<[f64; 2]>>,
-    /// Contributions of the cells.
-    cells: Vec<Cell>,
+    /// Accelerations at the start of the first step; `None` later.
+    pub acceleration: Option<Acceleration>,
+    /// Contributions of the cells to the momentum.
+    cells: Vec<Cell<2>>,
+    /// Inertia of the rotation, if a material has a micro-inertia.
+    turning: Option<Turning>,
     /// Density in units of the inertial density.
     pub density: f64,
 }
 
-/// Mass matrix and load of a cell.
+/// Inertia of the rotation.
+struct Turning {
+    /// Density times micro-inertia.
+    density: Density,
+    /// Contributions of the cells to the angular momentum of the rotation.
+    cells: Vec<Cell<1>>,
+}
+
+/// Mass matrix and load of a cell, for quantities with `C` components.
 #[derive(Clone, Copy)]
-struct Cell {
+struct Cell<const C: usize> {
     mass: Mass,
-    load: [[f64; 2]; NODES],
+    load: [[f64; C]; NODES],
+}
+
+impl<const C: usize> Cell<C> {
+    const EMPTY: Self = Cell { mass: [[0.0; NODES]; NODES], load: [[0.0; C]; NODES] };
+}
+
+/// Earlier nodal values of a quantity that the material carries, and its accelerations.
+struct Earlier<'a, const C: usize> {
+    last: &'a [[f64; C]],
+    before: Option<&'a [[f64; C]]>,
+    acceleration: Option<&'a [[f64; C]]>,
+}
+
+/// Material and integration points of an inertial force.
+#[derive(Clone, Copy)]
+pub struct Matter<'a> {
+    /// The materials.
+    pub materials: &'a [Material],
+    /// Their particles.
+    pub particles: &'a Particles,
+    /// The integration points, evaluated with these particles.
+    pub quadrature: &'a Quadrature,
 }
 
 impl Inertia {
@@ -66,14 +114,40 @@ impl Inertia {
     pub fn new(plan: &Plan) -> Self {
         let mesh = &plan.mesh;
         let backwards = [0, 1].map(|_| CellVelocities::new(mesh, &plan.enclosure, false));
-        let empty = Cell { mass: [[0.0; NODES]; NODES], load: [[0.0; 2]; NODES] };
+        let turning = plan.effects.micro_inertia.then(|| {
+            let neighbours = Neighbours::new(mesh, &plan.enclosure);
+            let materials = plan.state.materials.len();
+            let mut density = Density::new(mesh, neighbours, materials, true);
+            density.per_mass = |material| material.micro_inertia;
+            Turning { density, cells: vec![Cell::EMPTY; mesh.cells()] }
+        });
         Inertia {
             backwards,
             past: [None, None],
             acceleration: None,
-            cells: vec![empty; mesh.cells()],
+            cells: vec![Cell::EMPTY; mesh.cells()],
+            turning,
             density: plan.units.density / plan.units.inertial_density(),
         }
+    }
+
+    /// Nodal rotations of a flow, if they have inertia.
+    pub fn rotation_of<const D: usize>(&self, flow: &Flow<D>) -> Vec<[f64; 1]> {
+        let turns = self.turning.is_some();
+        flow.velocity.iter().filter(|_| turns).map(|u| [u[D - 1]]).collect()
+    }
+
+    /// A step of length `dt` in a number of parts from a flow, with the velocity `half` at its middle.
+    pub fn past_of<const D: usize>(
+        &self,
+        flow: &Flow<D>,
+        half: &[[f64; 2]],
+        dt: f64,
+        parts: u32,
+    ) -> Past {
+        let mut velocity = Vec::with_capacity(half.len());
+        flow.translation(&mut velocity);
+        Past { velocity, rotation: self.rotation_of(flow), half: half.to_vec(), dt, parts }
     }
 
     /// Enters a step from a flow with the nodal velocities `past.velocity`.
@@ -85,46 +159,123 @@ impl Inertia {
         }
     }
 
-    /// Ends the step to the first flow, whose nodal velocities are `velocity`: it determines the
-    /// accelerations if they are `regular`.
-    pub fn begin(&mut self, plan: &Plan, regular: bool, velocity: impl Fn(usize) -> [f64; 2]) {
+    /// Ends the step to the first flow: it determines the accelerations if they are `regular`.
+    pub fn begin<const D: usize>(&mut self, plan: &Plan, regular: bool, flow: &Flow<D>) {
         let [last, before] = &mut self.past;
         *before = None;
         let Some(impulse) = last.take().filter(|_| regular) else { return };
         let mesh = &*plan.mesh;
         let back = reversed(plan, &mut self.backwards[0], &impulse);
-        let acceleration = (0..mesh.nodes()).map(|node| {
+        let origin = |node: usize| {
             let at = mesh.wrap(mesh.node_position(node));
-            let from = trace(&back, impulse.parts, (mesh.locate(at), at));
-            let (now, then) = (velocity(node), interpolated(mesh, &impulse.velocity, from));
+            trace(&back, impulse.parts, (mesh.locate(at), at))
+        };
+        let velocity = (0..mesh.nodes()).map(|node| {
+            let (now, then) =
+                (flow.velocity[node], interpolated(mesh, &impulse.velocity, origin(node)));
             [0, 1].map(|c| (now[c] - then[c]) / impulse.dt)
         });
-        self.acceleration = Some(acceleration.collect());
+        let rotation = (0..impulse.rotation.len()).map(|node| {
+            let [then] = interpolated(mesh, &impulse.rotation, origin(node));
+            [(flow.velocity[node][D - 1] - then) / impulse.dt]
+        });
+        let (velocity, rotation) = (velocity.collect(), rotation.collect());
+        self.acceleration = Some(Acceleration { velocity, rotation });
     }
 
-    /// Computes the mass matrices and the load for a solution at the end of the last step.
-    pub fn update(
+    /// Computes the mass matrices, and the load of velocities and rotations for a solution at the end
+    /// of the last step.
+    pub fn update<const D: usize>(
         &mut self,
         plan: &Plan,
         density: &Density,
+        matter: Matter,
         term: &mut Term,
-        load: &mut Vec<[f64; 2]>,
+        load: &mut Vec<[f64; D]>,
     ) {
         let mesh = &*plan.mesh;
-        let Inertia { backwards, past: [last, before], acceleration, cells, density: unit } = self;
-        let Some(last) = last.as_ref() else { return };
+        let Inertia { backwards, past, acceleration, cells, turning, density: unit } = self;
+        let [Some(last), before] = past else { return };
         let ratio = before.as_ref().map(|b| last.dt / b.dt);
-        let [a0, a1, a2] = match (ratio, &acceleration) {
+        let rates = match (ratio, &acceleration) {
             (Some(r), _) => [(1.0 + 2.0 * r) / (1.0 + r), 1.0 + r, r * r / (1.0 + r)],
             (None, Some(_)) => [2.0, 2.0, 0.0],
             (None, None) => [1.0, 1.0, 0.0],
         };
-        let acceleration = acceleration.as_deref();
         let [first, second] = backwards;
-        let last_flow = reversed(plan, first, last);
-        let before_flow = before.as_ref().map(|b| (b, reversed(plan, second, b)));
+        let course = Course {
+            mesh,
+            last: (last, reversed(plan, first, last)),
+            before: before.as_ref().map(|b| (b, reversed(plan, second, b))),
+            rates,
+            unit: *unit,
+        };
+        let earlier = Earlier {
+            last: &last.velocity,
+            before: before.as_ref().map(|b| &*b.velocity),
+            acceleration: acceleration.as_ref().map(|a| &*a.velocity),
+        };
+        course.update(density, &earlier, cells);
+        term.rate = rates[0] / last.dt;
+        term.mass.clear();
+        term.mass.extend(cells.iter().map(|c| c.mass));
+        load.clear();
+        load.resize(mesh.nodes(), [0.0; D]);
+        add_up(mesh, cells, load, 0);
+        if let Some(turning) = turning {
+            let Matter { materials, particles, quadrature } = matter;
+            turning.density.update(mesh, particles, materials, quadrature);
+            let earlier = Earlier {
+                last: &last.rotation,
+                before: before.as_ref().map(|b| &*b.rotation),
+                acceleration: acceleration.as_ref().map(|a| &*a.rotation),
+            };
+            course.update(&turning.density, &earlier, &mut turning.cells);
+            term.turning.clear();
+            term.turning.extend(turning.cells.iter().map(|c| c.mass));
+            add_up(mesh, &turning.cells, load, D - 1);
+        }
+    }
+}
+
+/// Adds the loads of the cells to those of the nodes, from a component on.
+fn add_up<const C: usize, const D: usize>(
+    mesh: &Mesh,
+    cells: &[Cell<C>],
+    load: &mut [[f64; D]],
+    from: usize,
+) {
+    for (cell, of) in cells.iter().enumerate() {
+        for (node, f) in mesh.cell_nodes(cell).into_iter().zip(of.load) {
+            for (c, f) in f.into_iter().enumerate() {
+                load[node][from + c] += f;
+            }
+        }
+    }
+}
+
+/// The last two steps, each with its flow backwards in time.
+struct Course<'a> {
+    mesh: &'a Mesh,
+    last: (&'a Past, FrozenFlow<'a>),
+    before: Option<(&'a Past, FrozenFlow<'a>)>,
+    /// `a_0, a_1, a_2`.
+    rates: [f64; 3],
+    /// Density in units of the inertial density.
+    unit: f64,
+}
+
+impl Course<'_> {
+    /// Computes the mass matrices with a density, and the loads of what the material had.
+    fn update<const C: usize>(
+        &self,
+        density: &Density,
+        earlier: &Earlier<C>,
+        cells: &mut [Cell<C>],
+    ) {
+        let Course { mesh, last: (last, last_flow), before, rates: [_, a1, a2], unit } = self;
         threads::for_each(cells, GRAIN, |cell, out| {
-            *out = Cell { mass: [[0.0; NODES]; NODES], load: [[0.0; 2]; NODES] };
+            *out = Cell::EMPTY;
             if mesh.solid[cell] {
                 return;
             }
@@ -140,40 +291,28 @@ impl Inertia {
             density.for_fine_points(cell, |point| {
                 let Some(mut one) = origins.next() else { return };
                 if last.parts > 1 {
-                    one = trace(&last_flow, last.parts - 1, one);
+                    one = trace(last_flow, last.parts - 1, one);
                 }
-                let mut carried = interpolated(mesh, &last.velocity, one).map(|u| a1 * u);
-                if let Some(acceleration) = acceleration {
+                let mut carried = interpolated(mesh, earlier.last, one).map(|u| a1 * u);
+                if let Some(acceleration) = earlier.acceleration {
                     let a = interpolated(mesh, acceleration, one);
-                    carried = [carried[0] + last.dt * a[0], carried[1] + last.dt * a[1]];
+                    (0..C).for_each(|c| carried[c] += last.dt * a[c]);
                 }
-                if let Some((before, flow)) = &before_flow {
+                if let (Some((before, flow)), Some(values)) = (before, earlier.before) {
                     let two = trace(flow, before.parts, one);
-                    let u = interpolated(mesh, &before.velocity, two);
-                    carried = [carried[0] - a2 * u[0], carried[1] - a2 * u[1]];
+                    let u = interpolated(mesh, values, two);
+                    (0..C).for_each(|c| carried[c] -= a2 * u[c]);
                 }
-                let mass = *unit * volume * point.mass;
+                let mass = unit * volume * point.mass;
                 for a in 0..NODES {
                     let share = mass * point.n[a];
-                    out.load[a][0] += share * carried[0] / last.dt;
-                    out.load[a][1] += share * carried[1] / last.dt;
+                    (0..C).for_each(|c| out.load[a][c] += share * carried[c] / last.dt);
                     for b in 0..NODES {
                         out.mass[a][b] += share * point.n[b];
                     }
                 }
             });
         });
-        term.rate = a0 / last.dt;
-        term.mass.clear();
-        term.mass.extend(cells.iter().map(|c| c.mass));
-        load.clear();
-        load.resize(mesh.nodes(), [0.0; 2]);
-        for (cell, Cell { load: of_cell, .. }) in cells.iter().enumerate() {
-            for (node, f) in mesh.cell_nodes(cell).into_iter().zip(of_cell) {
-                load[node][0] += f[0];
-                load[node][1] += f[1];
-            }
-        }
     }
 }
 
@@ -203,12 +342,16 @@ fn end(mesh: &Mesh, way: &Displacement) -> (usize, [f64; 2]) {
 }
 
 /// Nodal values interpolated at a point of a cell.
-pub fn interpolated(mesh: &Mesh, nodal: &[[f64; 2]], (cell, at): (usize, [f64; 2])) -> [f64; 2] {
+pub fn interpolated<const C: usize>(
+    mesh: &Mesh,
+    nodal: &[[f64; C]],
+    (cell, at): (usize, [f64; 2]),
+) -> [f64; C] {
     let r = mesh.to_reference(cell, at).map(|r| r.clamp(-1.0, 1.0));
     interpolate(&mesh.cell_nodes(cell).map(|n| nodal[n]), &Shape::values(r))
 }
 
-/// Twice the kinetic energy, `integral rho u . u`; zero without inertia.
+/// Twice the kinetic energy, `integral rho (u . u + j w^2)`; zero without inertia.
 pub fn twice_kinetic<const D: usize>(mesh: &Mesh, term: &Term, flow: &Flow<D>) -> f64 {
     if term.mass.is_empty() {
         return 0.0;
@@ -217,7 +360,24 @@ pub fn twice_kinetic<const D: usize>(mesh: &Mesh, term: &Term, flow: &Flow<D>) -
         if mesh.solid[cell] {
             return [0.0];
         }
-        [term.square(cell, &flow.of_cell(mesh, cell).map(|u| [u[0], u[1]]))]
+        let turns = |u: [f64; D]| if D == 3 { u[D - 1] } else { 0.0 };
+        [term.square(cell, &flow.of_cell(mesh, cell).map(|u| [u[0], u[1], turns(u)]))]
     });
     sum
+}
+
+/// Spin `(v,x - u,y)/2` of nodal velocities at the nodes: the mean over the cells around each.
+pub fn spins(mesh: &Mesh, velocity: &[[f64; 2]]) -> Vec<[f64; 1]> {
+    let mut sums = vec![(0.0, 0.0); mesh.nodes()];
+    for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
+        let nodes = mesh.cell_nodes(cell);
+        let nodal = nodes.map(|n| velocity[n]);
+        for (a, node) in nodes.into_iter().enumerate() {
+            let at = [(a % 3) as f64 - 1.0, (a / 3) as f64 - 1.0];
+            let l = gradient(&nodal, &Shape::at(at), mesh.cell_size(cell));
+            sums[node].0 += 0.5 * (l[(1, 0)] - l[(0, 1)]);
+            sums[node].1 += 1.0;
+        }
+    }
+    sums.into_iter().map(|(sum, count)| [if count > 0.0 { sum / count } else { 0.0 }]).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::clock::Limiter;
 use super::error::SimError;
-use super::inertia::Past;
+use super::inertia::{Acceleration, Past};
 use super::row::{self, COLUMNS, GaugeRow, Row};
 use super::simulation::{Before, Simulation};
 use super::state::{State, StateError, flat, load_phases, save_phases, wrong_length};
@@ -180,19 +180,30 @@ impl<const D: usize> Simulation<D> {
             names.iter().for_each(|name| s.remove(name));
         }
         let names = ["inertia.velocity", "inertia.half", "inertia.step", "inertia.parts"];
-        if let Some(Past { velocity, half, dt, parts }) =
+        if let Some(Past { velocity, rotation, half, dt, parts }) =
             self.inertia.as_ref().and_then(|i| i.past[0].as_ref())
         {
             s.put_floats(names[0], flat(velocity));
             s.put_floats(names[1], flat(half));
             s.put_floats(names[2], [*dt]);
             s.put_counts(names[3], [u64::from(*parts)]);
+            if !rotation.is_empty() {
+                s.put_floats("inertia.rotation", flat(rotation));
+            }
         } else {
             names.iter().for_each(|name| s.remove(name));
         }
         match self.inertia.as_ref().and_then(|i| i.acceleration.as_ref()) {
-            Some(a) => s.put_floats("inertia.acceleration", flat(a)),
-            None => s.remove("inertia.acceleration"),
+            Some(a) => {
+                s.put_floats("inertia.acceleration", flat(&a.velocity));
+                if !a.rotation.is_empty() {
+                    s.put_floats("inertia.rotation_acceleration", flat(&a.rotation));
+                }
+            }
+            None => {
+                s.remove("inertia.acceleration");
+                s.remove("inertia.rotation_acceleration");
+            }
         }
         // The integration points follow from these factors, and the current factors from the
         // points.
@@ -246,6 +257,12 @@ impl<const D: usize> Simulation<D> {
         Ok(())
     }
 
+    /// Values of the rotation at the nodes, if it has inertia.
+    fn rotations(&self, s: &State, name: &'static str) -> Result<Vec<[f64; 1]>, StateError> {
+        let turns = self.plan.effects.micro_inertia;
+        if turns { s.tuples(name, self.plan.mesh.nodes()) } else { Ok(vec![]) }
+    }
+
     /// Restores a state of a run of the same plan.
     ///
     /// # Errors
@@ -278,11 +295,16 @@ impl<const D: usize> Simulation<D> {
                     name: "inertia.parts",
                     value: parts.to_string(),
                 })?;
-                Some(Past { velocity, half, dt, parts })
+                let rotation = self.rotations(s, "inertia.rotation")?;
+                Some(Past { velocity, rotation, half, dt, parts })
             }
         };
         let acceleration = match s.try_floats("inertia.acceleration") {
-            Some(_) => Some(s.tuples("inertia.acceleration", mesh.nodes())?),
+            Some(_) => {
+                let velocity = s.tuples("inertia.acceleration", mesh.nodes())?;
+                let rotation = self.rotations(s, "inertia.rotation_acceleration")?;
+                Some(Acceleration { velocity, rotation })
+            }
             None => None,
         };
         let factors = s.exactly("quadrature.factors", materials)?;

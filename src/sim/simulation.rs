@@ -68,7 +68,7 @@ pub struct Simulation<const D: usize> {
     /// Momentum of the last steps, if inertia is solved.
     pub(super) inertia: Option<Inertia>,
     /// Nodal forces of the momentum of the last steps; empty without inertia.
-    pub(super) momentum: Vec<[f64; 2]>,
+    pub(super) momentum: Vec<[f64; D]>,
     /// Nodal forces without gravity.
     pub(super) other_load: Vec<[f64; D]>,
     /// Current materials and gravity.
@@ -217,10 +217,7 @@ impl<const D: usize> Simulation<D> {
             // A flow that sides set in motion at once has unbounded accelerations beside them: the first
             // step does not use them.
             let regular = !sim.stokes.is_driven();
-            inertia.begin(&sim.plan, regular, |node| {
-                let u = sim.flow.velocity[node];
-                [u[0], u[1]]
-            });
+            inertia.begin(&sim.plan, regular, &sim.flow);
         }
         sim.baseline = (0..sim.matter.materials.len()).map(|m| sim.projected_share(m)).collect();
         sim.notes = sim.initial_notes(empty);

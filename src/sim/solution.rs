@@ -3,13 +3,14 @@
 
 use super::Integrator;
 use super::error::SimError;
-use super::inertia::{Past, twice_kinetic};
+use super::inertia::{self, Past, spins, twice_kinetic};
 use super::phases::Phases;
 use super::simulation::Simulation;
 use crate::solve::last_flow::{Iterate, LastFlow, NoFlow};
 use crate::solve::nonlinear::Matter;
 use crate::solve::report::{SolveError, Stopping};
 use crate::solve::stokes::Loads;
+use crate::solve::terms::CellTerm;
 use crate::solve::terms::restoring::Ahead;
 use crate::solve::terms::weight::{Masses, add_acceleration, add_gravity};
 use crate::space::flow::Flow;
@@ -112,14 +113,17 @@ impl<const D: usize> Simulation<D> {
         }
         let half = vec![[0.0; 2]; mesh.nodes()];
         let dt = IMPULSE * plan.clock.end.min(1.0);
-        inertia.enter(Past { velocity, half, dt, parts: 1 });
+        // What moves as a rigid body at the start rotates with it.
+        let rotation = if plan.effects.micro_inertia { spins(mesh, &velocity) } else { vec![] };
+        inertia.enter(Past { velocity, rotation, half, dt, parts: 1 });
         if plan.initial_velocity.is_some() || self.stokes.is_driven() {
             self.solve(None, seconds)?;
             let mut velocity = Vec::new();
             self.flow.translation(&mut velocity);
             self.flow.pressure.fill([0.0; 3]);
-            let past = Past { half: velocity.clone(), velocity, dt, parts: 1 };
             if let Some(inertia) = &mut self.inertia {
+                let rotation = inertia.rotation_of(&self.flow);
+                let past = Past { half: velocity.clone(), velocity, rotation, dt, parts: 1 };
                 inertia.past = [Some(past), None];
             }
         }
@@ -129,12 +133,24 @@ impl<const D: usize> Simulation<D> {
     /// Adds the momentum of the last steps to the load.
     fn update_inertia(&mut self) {
         let plan = self.plan.clone();
-        let Simulation { inertia, density, terms, momentum, load, .. } = self;
+        let Simulation {
+            inertia,
+            density,
+            terms,
+            momentum,
+            load,
+            particles,
+            matter,
+            quadrature,
+            ..
+        } = self;
         let Some(inertia) = inertia else { return };
-        inertia.update(&plan, density, &mut terms.inertia, momentum);
+        let matter = inertia::Matter { materials: &matter.materials, particles, quadrature };
+        inertia.update(&plan, density, matter, &mut terms.inertia, momentum);
         for (load, momentum) in load.iter_mut().zip(momentum) {
-            load[0] += momentum[0];
-            load[1] += momentum[1];
+            for c in 0..terms.inertia.components() {
+                load[c] += momentum[c];
+            }
         }
     }
 
@@ -148,9 +164,13 @@ impl<const D: usize> Simulation<D> {
         let nodes = load.iter_mut().zip(momentum).zip(&flow.velocity);
         let mut power = 0.0;
         for ((load, momentum), u) in nodes {
-            load[0] -= momentum[0];
-            load[1] -= momentum[1];
+            for c in 0..terms.inertia.components() {
+                load[c] -= momentum[c];
+            }
             power += momentum[0] * u[0] + momentum[1] * u[1];
+            for c in 2..terms.inertia.components() {
+                power += momentum[c] * u[c];
+            }
         }
         let taken = terms.inertia.rate * twice_kinetic(&plan.mesh, &terms.inertia, flow);
         report.power_in -= power;

@@ -3,7 +3,6 @@
 use super::Integrator;
 use super::clock::{Limiter, next_step};
 use super::error::SimError;
-use super::inertia::Past;
 use super::moving;
 use super::phases::Phases;
 use super::simulation::{Before, Simulation};
@@ -27,13 +26,6 @@ const FIRST_ATTEMPTS: u32 = 3;
 const LARGEST_RISE: f64 = 1.25;
 /// See [`LARGEST_RISE`].
 const LARGEST_FALL: f64 = 0.5;
-
-/// A step of length `dt` in a number of parts from a flow, with the velocity `half` at its middle.
-fn past<const D: usize>(flow: &Flow<D>, half: &[[f64; 2]], dt: f64, parts: u32) -> Past {
-    let mut velocity = Vec::with_capacity(half.len());
-    flow.translation(&mut velocity);
-    Past { velocity, half: half.to_vec(), dt, parts }
-}
 
 impl<const D: usize> Simulation<D> {
     /// Takes one step.
@@ -92,7 +84,7 @@ impl<const D: usize> Simulation<D> {
         let compliant = |m: u8| matter.materials[usize::from(m)].law.compliance > 0.0;
         let part = dt / f64::from(parts);
         if let Some(inertia) = inertia {
-            inertia.enter(past(&self.flow, half, dt, parts));
+            inertia.enter(inertia.past_of(&self.flow, half, dt, parts));
         }
         let mut frozen_flow = {
             let kinks = quadrature.kinks();
@@ -255,7 +247,7 @@ impl<const D: usize> Simulation<D> {
         let flow = self.flow.clone();
         // To the middle of the step, the first order in time suffices.
         let steps = self.inertia.as_mut().map(|inertia| {
-            let only = past(&flow, &self.half, 0.5 * dt, parts);
+            let only = inertia.past_of(&flow, &self.half, 0.5 * dt, parts);
             std::mem::replace(&mut inertia.past, [Some(only), None])
         });
         // In the first step a mode may at most change its sign. With exactly half a step ahead, the

@@ -68,6 +68,8 @@ pub struct Density {
     densities: Vec<Option<Polynomial>>,
     /// Whether densities lie nowhere below that of the lightest material.
     bounded: bool,
+    /// What is distributed, per mass of a material: 1 for the mass itself.
+    pub per_mass: fn(&Material) -> f64,
     /// Parts of cells with solids of any shape in them; their density is constant.
     parts: SharedParts,
     /// Measures of the cells.
@@ -127,6 +129,7 @@ impl Density {
             fits: vec![Fit::default(); materials],
             densities: Vec::with_capacity(materials),
             bounded,
+            per_mass: |_| 1.0,
             parts: mesh.shared_parts(),
             measures: (0..mesh.cells()).map(|cell| mesh.whole_measure(cell)).collect(),
         }
@@ -145,7 +148,7 @@ impl Density {
             let kept = self.of_sides[cell].take();
             self.at_gauss[cell] = match quadrature.content(cell) {
                 Content::Uniform { material, .. } | Content::Flowing { material } => {
-                    [materials[material as usize].density; 9]
+                    [self.of(&materials[material as usize]); 9]
                 }
                 Content::Mixed => {
                     self.gather(mesh, cell, particles, materials);
@@ -261,9 +264,15 @@ impl Density {
         }
     }
 
+    /// Density of a material that does not carry its own.
+    fn of(&self, material: &Material) -> f64 {
+        (self.per_mass)(material) * material.density
+    }
+
     /// Density of a material at a point of the cell, after its fits.
     fn of_material(&self, m: usize, r: [f64; 2], materials: &[Material]) -> f64 {
-        self.densities[m].as_ref().map_or(materials[m].density, |f| f.at(r))
+        let fitted = self.densities[m].as_ref();
+        fitted.map_or_else(|| self.of(&materials[m]), |f| (self.per_mass)(&materials[m]) * f.at(r))
     }
 
     /// Density at a point of the cell for shares that vary linearly.
@@ -294,7 +303,7 @@ impl Density {
         }
         let present = (0..materials.len()).filter(|&m| self.centroids.share(m) > 0.0);
         let lightest =
-            |m: usize| if materials[m].carries_density { 0.0 } else { materials[m].density };
+            |m: usize| if materials[m].carries_density { 0.0 } else { self.of(&materials[m]) };
         let least = present.map(lightest).fold(f64::INFINITY, f64::min);
         let mean: f64 = linear.iter().zip(GAUSS_3X3.iter()).map(|(d, g)| d * g.weight).sum();
         let lowest = (0..SUBPOINTS).map(|q| at_fine_point(&linear, q)).fold(mean, f64::min);

@@ -235,7 +235,7 @@ impl<const D: usize> Fresh<D> {
             self.rotation = Some(rotation);
         }
         for term in terms.on_cells().into_iter().filter(|t| t.acts_on(cell)) {
-            for i in 0..2 * NODES {
+            for i in 0..term.components().min(D) * NODES {
                 for j in 0..NODES * (i / NODES + 1) {
                     let (nodes, components) = ([i % NODES, j % NODES], [i / NODES, j / NODES]);
                     k[i][j] += term.entry(cell, nodes, components);

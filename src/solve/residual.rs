@@ -186,12 +186,13 @@ impl<const D: usize> Stokes<D> {
         }
         let mut taken = 0.0;
         for term in terms.on_cells().into_iter().filter(|t| t.acts_on(cell)) {
-            let along = u.map(|u| [u[0], u[1]]);
-            let (f, power) = term.force(cell, nodes, along);
+            let motion = u.map(|u| [u[0], u[1], if D == 3 { u[D - 1] } else { 0.0 }]);
+            let (f, power) = term.force(cell, nodes, &motion);
             taken += power;
             for (force, f) in force.iter_mut().zip(f) {
-                force[0] += f[0];
-                force[1] += f[1];
+                for c in 0..term.components().min(D) {
+                    force[c] += f[c];
+                }
             }
         }
         share.force = force;

@@ -3,8 +3,9 @@
 use super::Effort;
 use super::report::{Bound, Section, Table, number};
 use crate::cases::inertia::{
-    Resolution, cavity, decaying_vortex, energy_lost_by_vortex, falling_drop, plate,
-    speed_over_plate, standing_wave, wave_decay, wave_period,
+    Resolution, cavity, decaying_vortex, energy_lost_by_vortex, falling_drop,
+    motion_of_turning_wave, plate, speed_over_plate, standing_wave, turning_wave, wave_decay,
+    wave_period,
 };
 use crate::cases::{CaseError, start};
 use crate::scene::SceneSource;
@@ -16,7 +17,8 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
         title: "Inertia",
         about: "*Decaying vortex* (Taylor and Green) at Re = 1/(nu k) = 1000 over one turn: error of \
                 the kinetic energy lost, of which inviscid flow would lose nothing. *Plate*: fluid \
-                over a plate that starts suddenly (Rayleigh). *Free fall* of a drop in air of density \
+                over a plate that starts suddenly (Rayleigh). *Wave of shear and rotation* in a Cosserat fluid whose rotation has \
+                inertia (`micro_inertia`), which decays between walls without friction. *Free fall* of a drop in air of density \
                 1e-5: thin air (dynamic viscosity 1e-6) is stirred by the drop and slows it, and \
                 stiffer air does not. *Standing wave* of a hundredth of its length between water and \
                 air of density 1e-3: minima of the kinetic energy give the period; its maxima fall \
@@ -27,6 +29,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     };
     vortex(effort, &mut out)?;
     moving_plate(effort, &mut out)?;
+    turning(effort, &mut out)?;
     fall(effort, &mut out)?;
     wave(effort, &mut out)?;
     if effort == Effort::Full {
@@ -105,6 +108,27 @@ fn moving_plate(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     }
     out.check("plate, 16 cells, step 0.1: error", errors[0], Bound::AtMost(0.01));
     out.check("plate, 32 cells, step 0.025: error", errors[2], Bound::AtMost(1e-3));
+    out.tables.push(table);
+    Ok(())
+}
+
+fn turning(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
+    let title = "Wave of shear and rotation: relative errors at t = 2";
+    let mut table = Table::new(title, &["cells", "largest step", "velocity", "rotation"]);
+    let mut errors = vec![];
+    for &(cells, max_step) in
+        effort.take(&[(32, 0.1), (32, 0.05), (32, 0.025), (32, 0.0125), (64, 0.0125)])
+    {
+        let run = finish(&turning_wave(Resolution { cells, max_step }), |_| {})?;
+        let exact = motion_of_turning_wave(run.row().time);
+        let found = [run.velocity_at([0.0, 0.0])[0], run.velocity_at([0.0, 0.5])[2]];
+        let [u, w] = [0, 1].map(|c| found[c] / exact[c] - 1.0);
+        errors.push(u.abs().max(w.abs()));
+        table.rows.push(vec![cells.to_string(), number(max_step), number(u), number(w)]);
+    }
+    out.check("wave of shear and rotation, step 0.05: error", errors[1], Bound::AtMost(1e-3));
+    let order = (errors[1] / errors[2]).log2();
+    out.check("wave of shear and rotation: order in time", order, Bound::AtLeast(1.9));
     out.tables.push(table);
     Ok(())
 }

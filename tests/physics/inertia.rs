@@ -159,3 +159,99 @@ fn a_flow_that_a_side_sets_in_motion_starts_smoothly() {
         assert!(run.row().energy_error.abs() < 0.02, "{cells}: {}", run.row().energy_error);
     }
 }
+
+/// A Cosserat fluid in a periodic box that a couple sets turning.
+const TURNING: &str = r#"schema = 1
+name = "turning"
+inertia = true
+[domain]
+x = [0, 1]
+y = [0, 1]
+[accuracy]
+cells = 4
+[time]
+end = 1
+max_step = 0.05
+tolerance = 1
+courant = 10
+[materials.grains]
+density = 2
+shear_viscosity = 0.1
+coupling_viscosity = 0.05
+internal_length = 0.1
+micro_inertia = 0.1
+[[regions]]
+material = "grains"
+[body_force]
+couple = 0.3
+[boundaries]
+left.kind = "periodic"
+right.kind = "periodic"
+bottom.kind = "periodic"
+top.kind = "periodic"
+"#;
+
+#[test]
+fn a_couple_turns_grains_with_inertia_gradually() {
+    // rho j dw/dt = c - 4 eta_c w, with a uniform rotation that moves nothing.
+    let at = |run: &dyn Run| run.velocity_at([0.3, 0.6]);
+    let errors = [0.02, 0.01].map(|step| {
+        let mut run = scene(TURNING, &[&format!("time.max_step={step}")]);
+        assert!(at(&*run)[2].abs() < 1e-5);
+        finish(run.as_mut(), |run| {
+            let [u, v, w] = at(run);
+            assert!(u.hypot(v) < 1e-10, "{u} {v}");
+            assert!((run.row().kinetic_energy - 0.1 * w * w).abs() < 1e-10 * w * w);
+            assert!(run.row().energy_error.abs() < 1e-2, "{}", run.row().energy_error);
+        });
+        let exact = 0.3 / 0.2 * (1.0 - (-0.2 * run.row().time / 0.2).exp());
+        (at(&*run)[2] / exact - 1.0).abs()
+    });
+    assert!(errors[1] < 1e-4 && errors[0] / errors[1] > 3.5, "{errors:?}");
+}
+
+#[test]
+fn a_rotation_without_inertia_follows_at_once() {
+    let rotation = |sets: &[&str]| {
+        let mut run = scene(TURNING, sets);
+        (0..5).for_each(|_| run.step().unwrap());
+        (run.velocity_at([0.3, 0.6])[2], run.state_hash())
+    };
+    let (none, hash) = rotation(&["materials.grains.micro_inertia=0"]);
+    assert!((none / 1.5 - 1.0).abs() < 1e-10, "{none}");
+    let without = TURNING.replace("micro_inertia = 0.1\n", "");
+    let mut run = scene(&without, &[]);
+    (0..5).for_each(|_| run.step().unwrap());
+    assert_eq!((run.velocity_at([0.3, 0.6])[2], run.state_hash()), (none, hash));
+    // Steps are far longer than the relaxation time of the light grains.
+    let (light, _) = rotation(&["materials.grains.micro_inertia=1e-6"]);
+    assert!((light / none - 1.0).abs() < 1e-3, "{light}");
+}
+
+#[test]
+fn a_resumed_run_of_turning_grains_equals_the_uninterrupted_one() {
+    for before in [0, 3] {
+        let mut whole = scene(TURNING, &[]);
+        (0..before).for_each(|_| whole.step().unwrap());
+        let mut resumed = scene(TURNING, &[]);
+        resumed.restore(&whole.state()).unwrap();
+        for run in [&mut whole, &mut resumed] {
+            (0..3).for_each(|_| run.step().unwrap());
+        }
+        let at = [0.3, 0.6];
+        assert_eq!(whole.velocity_at(at), resumed.velocity_at(at), "{before}");
+    }
+}
+
+#[test]
+fn what_starts_as_a_rigid_body_turns_with_it() {
+    let sets = ["materials.grains.micro_inertia=10"];
+    let text =
+        TURNING.replace("periodic", "no_slip").replace("[body_force]\ncouple = 0.3\n", "").replace(
+            "[boundaries]",
+            "[initial_velocity]\nx = \"-(y - 0.5)\"\ny = \"x - 0.5\"\n[boundaries]",
+        );
+    let run = scene(&text, &sets);
+    let [_, _, w] = run.velocity_at([0.4, 0.55]);
+    assert!((w - 1.0).abs() < 0.02, "{w}");
+}

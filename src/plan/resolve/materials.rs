@@ -1,7 +1,7 @@
 //! This module resolves the `[materials]` tables and gravity into checked values in SI units.
 
 use super::flow_curves::{self, Generalised, Surroundings, generalised};
-use super::rotation::rotation;
+use super::rotation::{micro_inertia, rotation};
 use super::values::{Result, finite_range, not_negative, positive, ranges};
 use crate::laws::cosserat::Cosserat;
 use crate::laws::flow_curve::FlowCurve;
@@ -46,6 +46,7 @@ pub(super) struct SiMaterial {
     pub(super) compliance: f64,
     /// Viscosities of the rotation; relative to the shear viscosity if there is a flow curve.
     pub(super) rotation: Option<Cosserat>,
+    pub(super) micro_inertia: f64,
     /// Viscosity of shear along the layers; relative to the shear viscosity if there is a flow curve.
     pub(super) layer_viscosity: Option<f64>,
     pub(super) curve: Option<FlowCurve>,
@@ -99,6 +100,7 @@ impl SiMatter {
                     carries_viscosity: m.viscosity_field.is_some(),
                     density: m.density / u.density,
                     carries_density: m.density_field.is_some(),
+                    micro_inertia: m.micro_inertia / (u.length * u.length),
                     law: Law {
                         shear: m.layer_viscosity.map_or(Shear::Newtonian, |v| Shear::Layered {
                             layer_viscosity: v / viscosity,
@@ -210,6 +212,7 @@ impl SiMaterial {
             (None, None) => 0.0,
         };
         let rotation = rotation((name, m), scope, coupling, warnings)?;
+        let micro_inertia = micro_inertia((name, m), (scene, scope), rotation.is_some())?;
         let bends = rotation.is_some_and(|r| r.bending() != 0.0);
         let bulk = match (&m.bulk_viscosity, contacts, &m.granular) {
             (Some(q), ..) => Some(positive(q, scope, "bulk_viscosity")?),
@@ -244,6 +247,7 @@ impl SiMaterial {
             density_field,
             compliance: bulk.map_or(0.0, |b| 1.0 / b),
             rotation,
+            micro_inertia,
             layer_viscosity: layer,
             curve: curve.map(|g: Generalised| g.curve),
             background: m.background,

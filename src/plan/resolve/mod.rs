@@ -129,6 +129,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
         gravity: si.gravity != [0.0; 2] && has_density,
         flow_curves: si.materials.iter().any(|m| m.curve.is_some()),
         inertia: scene.inertia && has_density,
+        micro_inertia: si.materials.iter().any(|m| m.micro_inertia > 0.0),
     };
     if !effects.rotation {
         for (s, piece) in boundary.pieces() {

@@ -1,9 +1,10 @@
-//! This module resolves the rotation of a material: its internal lengths or its couple viscosity.
+//! This module resolves the rotation of a material: its internal lengths or its couple viscosity, and its
+//! micro-inertia.
 
 use super::values::{Result, not_negative};
 use crate::laws::cosserat::{Cosserat, couple_viscosity};
 use crate::plan::Warning;
-use crate::scene::{self, Quantity, SceneError, Scope};
+use crate::scene::{self, Quantity, Scene, SceneError, Scope};
 
 /// The rotation of a material with the coupling viscosity `coupling`; `None` if it is classical.
 pub(super) fn rotation(
@@ -40,6 +41,31 @@ pub(super) fn rotation(
     }
     let resists = coupling > 0.0 && couple.max(layer_couple) > 0.0;
     Ok(resists.then_some(Cosserat { coupling, couple, layer_couple }))
+}
+
+/// Micro-inertia of a material, m2; zero without. It needs inertia, and a rotation (`rotates`).
+pub(super) fn micro_inertia(
+    (name, m): (&str, &scene::Material),
+    (scene, scope): (&Scene, &Scope),
+    rotates: bool,
+) -> Result<f64> {
+    let Some(q) = &m.micro_inertia else { return Ok(0.0) };
+    let j = not_negative(q, scope, "micro_inertia")?;
+    let refuse = |lacks: &str, remedy: &str| {
+        let message = format!("material `{name}` has micro_inertia but {lacks}");
+        Err(SceneError::at(q, message, remedy))
+    };
+    if !scene.inertia {
+        return refuse("the scene has no inertia", "set `inertia = true`, or remove micro_inertia");
+    }
+    if !rotates && j > 0.0 {
+        return refuse(
+            "no rotation",
+            "give the material internal_length and coupling_viscosity (with a flow curve: \
+             coupling_ratio), or remove micro_inertia",
+        );
+    }
+    Ok(j)
 }
 
 /// Refuses an internal length `q` of the layers without layers or without an internal length.

@@ -46,6 +46,7 @@ pub fn resolve(scene: &Scene) -> Result<Plan> {
             ));
         }
         let mut state = SiMatter::new(&current, &scope)?.matter(&plan.units);
+        plan.effects.micro_inertia |= state.materials.iter().any(|m| m.micro_inertia > 0.0);
         state.relaxation = relaxation(&state, &plan.mesh, inertial(scene, &plan.units));
         let label =
             change.set.iter().map(|(k, v)| format!("{k} = {v}")).collect::<Vec<_>>().join(", ");
@@ -166,6 +167,7 @@ fn set_material(m: &mut scene::Material, field: &str, value: &Quantity) -> bool 
         "coupling_viscosity" => m.coupling_viscosity = Some(value.clone()),
         "internal_length" => m.internal_length = Some(value.clone()),
         "layer_internal_length" => m.layer_internal_length = Some(value.clone()),
+        "micro_inertia" => m.micro_inertia = Some(value.clone()),
         "couple_viscosity" => m.couple_viscosity = Some(value.clone()),
         "layer_viscosity" => m.layer_viscosity = Some(value.clone()),
         "coupling_ratio" => m.coupling_ratio = Some(value.clone()),

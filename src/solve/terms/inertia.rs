@@ -1,18 +1,22 @@
-//! This module computes the inertial term: `rate integral rho u . u~` with the rate `a_0/dt` of the
-//! backward differentiation in time, and the load of the earlier velocities.
+//! This module computes the inertial terms: `rate integral rho u . u~` with the rate `a_0/dt` of the
+//! backward differentiation in time, and the load of the earlier velocities; for the rotation of
+//! materials with a micro-inertia `j`, `rate integral rho j w w~`.
 //!
 //! ```text
 //! rho du/dt = rho (a_0 u - a_1 u_1 + a_2 u_2)/dt
+//! rho j dw/dt = rho j (a_0 w - a_1 w_1 + a_2 w_2)/dt
 //! ```
 //! `u_1` and `u_2` are the velocities, one and two steps before, of the material that is at a point
 //! now; [`sim::inertia`](crate::sim::inertia) finds them. The density is that of the weight, so a
 //! body in free fall has exactly the acceleration of gravity. Matrix and load use the same points,
-//! so a uniform motion stays uniform. The rotation has no inertia.
+//! so a uniform motion stays uniform. The micro-inertia is the moment of inertia of the rotating grains
+//! per mass (A. C. Eringen, "Theory of micropolar fluids", J. Math. Mech. 16 (1966) 1); without it the
+//! rotation has no inertia.
 
-use super::CellTerm;
+use super::{CellTerm, Motion};
 use crate::space::shape::NODES;
 
-/// Mass matrix of a cell for one component of the velocity.
+/// Mass matrix of a cell for one component of the velocity, or for the rotation.
 pub type Mass = [[f64; NODES]; NODES];
 
 /// The inertia of all cells.
@@ -22,6 +26,8 @@ pub struct Inertia {
     pub rate: f64,
     /// Mass matrix of each cell; empty without inertia.
     pub mass: Vec<Mass>,
+    /// The same of the rotation, with the density `rho j`; empty without micro-inertia.
+    pub turning: Vec<Mass>,
 }
 
 impl Inertia {
@@ -36,13 +42,17 @@ impl Inertia {
         if self.mass.is_empty() { 0.0 } else { self.rate * self.total(cell) / volume * h * h }
     }
 
-    /// `u . M u` of a cell with the nodal velocities `u`.
-    pub fn square(&self, cell: usize, u: &[[f64; 2]; NODES]) -> f64 {
+    /// Twice the kinetic energy of a cell, `u . M u` and for the rotation `w . M_j w`, with the nodal
+    /// velocities and rotations `u`.
+    pub fn square(&self, cell: usize, u: &Motion) -> f64 {
         let mut sum = 0.0;
         for (row, ua) in self.mass[cell].iter().zip(u) {
             for (m, ub) in row.iter().zip(u) {
                 sum += m * (ua[0] * ub[0] + ua[1] * ub[1]);
             }
+        }
+        for (row, ua) in self.turning.get(cell).into_iter().flatten().zip(u) {
+            sum += row.iter().zip(u).map(|(m, ub)| m * ua[2] * ub[2]).sum::<f64>();
         }
         sum
     }
@@ -53,23 +63,29 @@ impl CellTerm for Inertia {
         !self.mass.is_empty()
     }
 
-    fn entry(&self, cell: usize, [a, b]: [usize; 2], [c, d]: [usize; 2]) -> f64 {
-        if c == d { self.rate * self.mass[cell][a][b] } else { 0.0 }
+    fn components(&self) -> usize {
+        if self.turning.is_empty() { 2 } else { 3 }
     }
 
-    fn force(
-        &self,
-        cell: usize,
-        _nodes: &[usize; NODES],
-        u: [[f64; 2]; NODES],
-    ) -> ([[f64; 2]; NODES], f64) {
-        let mut force = [[0.0; 2]; NODES];
+    fn entry(&self, cell: usize, [a, b]: [usize; 2], [c, d]: [usize; 2]) -> f64 {
+        match [c, d] {
+            [2, 2] => self.rate * self.turning[cell][a][b],
+            _ if c == d => self.rate * self.mass[cell][a][b],
+            _ => 0.0,
+        }
+    }
+
+    fn force(&self, cell: usize, _nodes: &[usize; NODES], u: &Motion) -> (Motion, f64) {
+        let mut force = [[0.0; 3]; NODES];
         for (f, row) in force.iter_mut().zip(&self.mass[cell]) {
-            for (m, u) in row.iter().zip(&u) {
+            for (m, u) in row.iter().zip(u) {
                 f[0] -= self.rate * m * u[0];
                 f[1] -= self.rate * m * u[1];
             }
         }
-        (force, self.rate * self.square(cell, &u))
+        for (f, row) in force.iter_mut().zip(self.turning.get(cell).into_iter().flatten()) {
+            f[2] -= self.rate * row.iter().zip(u).map(|(m, u)| m * u[2]).sum::<f64>();
+        }
+        (force, self.rate * self.square(cell, u))
     }
 }

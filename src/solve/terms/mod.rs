@@ -33,22 +33,25 @@ use crate::space::shape::NODES;
 use inertia::Inertia;
 use restoring::Restoring;
 
-/// A symmetric positive term on whole cells that acts on velocities.
+/// Velocities and rotations of the nodes of a cell, or forces and couples on them.
+pub type Motion = [[f64; 3]; NODES];
+
+/// A symmetric positive term on whole cells that acts on velocities, and possibly on rotations.
 pub trait CellTerm: Send + Sync {
     /// Whether the term contributes to a cell.
     fn acts_on(&self, cell: usize) -> bool;
 
+    /// Number of components on which the term acts: the two velocities, or the rotation besides.
+    fn components(&self) -> usize {
+        2
+    }
+
     /// Entry of the matrix of a cell for nodes `a`, `b` and components `c`, `d`.
     fn entry(&self, cell: usize, nodes: [usize; 2], components: [usize; 2]) -> f64;
 
-    /// Forces on the nodes of a cell with the velocities `u`, and the power that they take from the
-    /// flow.
-    fn force(
-        &self,
-        cell: usize,
-        nodes: &[usize; NODES],
-        u: [[f64; 2]; NODES],
-    ) -> ([[f64; 2]; NODES], f64);
+    /// Forces and couples on the nodes of a cell with the velocities and rotations `u`, and the power
+    /// that they take from the flow.
+    fn force(&self, cell: usize, nodes: &[usize; NODES], u: &Motion) -> (Motion, f64);
 }
 
 /// A side of a cell.

@@ -32,7 +32,7 @@
 //! fluid at rest below a fluid a million times thinner, this happens at a thousandth of the heavy
 //! fluid's relaxation time.
 
-use super::{CellFace, CellTerm, FaceTerm, Powers};
+use super::{CellFace, CellTerm, FaceTerm, Motion, Powers};
 use crate::solve::density::Density;
 use crate::space::mesh::Mesh;
 use crate::space::neighbours::Face;
@@ -158,22 +158,18 @@ impl CellTerm for Restoring {
         if c == d { self.cell_strength(cell) * mass } else { 0.0 }
     }
 
-    fn force(
-        &self,
-        cell: usize,
-        nodes: &[usize; NODES],
-        u: [[f64; 2]; NODES],
-    ) -> ([[f64; 2]; NODES], f64) {
+    fn force(&self, cell: usize, nodes: &[usize; NODES], u: &Motion) -> (Motion, f64) {
         let mut power = 0.0;
         let force = std::array::from_fn(|a| {
             let mass = |b: usize| LINE_MASS[a % 3][b % 3] * LINE_MASS[a / 3][b / 3];
-            std::array::from_fn(|c| {
+            let mut along = |c: usize| {
                 let change = |b: usize| u[b][c] - self.before[nodes[b]][c];
                 let f =
                     self.cell_strength(cell) * (0..NODES).map(|b| mass(b) * change(b)).sum::<f64>();
                 power += f * u[a][c];
                 -f
-            })
+            };
+            [along(0), along(1), 0.0]
         });
         (force, power)
     }
