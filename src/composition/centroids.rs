@@ -70,6 +70,17 @@ impl Centroids {
         }
     }
 
+    /// Adds the material `m` that stands for a void, with its share of the cell: what the materials, whose
+    /// volumes are multiplied by `factors`, leave free of it.
+    pub fn add_void(&mut self, (m, share): (usize, f64), factors: &[f64]) {
+        let (mut volume, mut moment) = (0.0, [0.0; 2]);
+        for (part, factor) in self.parts.iter().zip(factors) {
+            volume += part.volume * factor;
+            (0..2).for_each(|c| moment[c] -= part.moment[c] * factor);
+        }
+        self.parts[m] = Part { volume: volume * share / (1.0 - share), moment };
+    }
+
     /// Computes the shares and the shifted centroids of the gathered particles. The volume of each
     /// material is multiplied by its factor; `viscosity` yields that of each material of the scene.
     pub fn finish(&mut self, factors: &[f64], viscosity: impl Iterator<Item = f64> + Clone) {

@@ -43,6 +43,8 @@ pub struct Gathered {
     points: [f64; 9],
     /// Particles of the cell and its neighbours.
     surroundings: Surroundings,
+    /// The material that stands for a void, and its share of the cell.
+    void: Option<(usize, f64)>,
     /// Working memory.
     numbers: Vec<f64>,
 }
@@ -95,6 +97,7 @@ impl Gathered {
 
     /// Computes the sums over the particles of a cell.
     pub fn gather(&mut self, mesh: &Mesh, cell: usize, particles: &Particles, kinds: &[Kind]) {
+        self.void = None;
         let measure = mesh.whole_measure(cell);
         self.points = GAUSS_3X3.each_ref().map(|g| measure.share(g.weight, g.r[0]));
         self.weight.fill(0.0);
@@ -128,6 +131,15 @@ impl Gathered {
                 self.log_viscosity[m].add(volume, r, v[p].ln());
             }
         }
+    }
+
+    /// Adds the material `m` that stands for a void, with its share of the cell, after
+    /// [`Gathered::gather`].
+    pub fn add_void(&mut self, (m, share): (usize, f64), factors: &[f64]) {
+        let volume: f64 = self.volume.iter().zip(factors).map(|(v, f)| v * f).sum();
+        self.volume[m] = volume * share / (1.0 - share);
+        self.weight[9 * m..9 * m + 9].fill(self.volume[m]);
+        self.void = Some((m, share));
     }
 
     /// The two materials of the cell and the particles around it; `None` if the cell has more or
@@ -202,6 +214,9 @@ impl Gathered {
     ) -> &Centroids {
         self.centroids.prepare(factors.len());
         self.centroids.gather(mesh, cell, particles);
+        if let Some(void) = self.void {
+            self.centroids.add_void(void, factors);
+        }
         self.centroids.finish(factors, viscosity);
         &self.centroids
     }

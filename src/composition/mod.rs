@@ -6,15 +6,18 @@
 
 pub mod centroids;
 pub mod features;
+pub mod fill;
 mod gather;
 pub mod interface;
 pub mod straight;
 
 pub use gather::{Gathered, SCRATCH};
 
+use crate::space::constraints::FixedSides;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::threads;
+use fill::Fill;
 
 /// Largest number of cells per task.
 const GRAIN: usize = 32;
@@ -46,6 +49,8 @@ pub enum Content {
     Mixed,
     /// A solid block.
     Solid,
+    /// Nothing: a void.
+    Empty,
     /// Not evaluated yet.
     Unknown,
 }
@@ -93,8 +98,10 @@ pub struct Composition {
     factors: Vec<f64>,
     /// Whether the content of each cell may have changed in the last update.
     fresh: Vec<bool>,
-    /// Content of each cell in the last update; `None` if the cell is empty.
+    /// Content of each cell in the last update; `None` if nothing fills it and nothing may be empty.
     found: Vec<Option<Content>>,
+    /// Filled shares of the cells, if a void is around the materials.
+    fill: Option<Fill>,
 }
 
 impl Composition {
@@ -107,7 +114,24 @@ impl Composition {
             factors: vec![1.0; materials],
             fresh: vec![false; cells],
             found: vec![None; cells],
+            fill: None,
         }
+    }
+
+    /// Lets a void be around the materials.
+    pub fn leave_void(&mut self, fill: Fill) {
+        self.fill = Some(fill);
+    }
+
+    /// Filled shares of the cells, if a void is around the materials.
+    pub fn fill(&self) -> Option<&Fill> {
+        self.fill.as_ref()
+    }
+
+    /// The material that stands for the void and the share of the cell that it has, in a cell that is
+    /// filled in part.
+    pub fn void_in(&self, cell: usize) -> Option<(usize, f64)> {
+        self.fill.as_ref()?.void_in(cell)
     }
 
     /// Content of a cell.
@@ -162,11 +186,19 @@ impl Composition {
         particles: &Particles,
         kinds: &[Kind],
         (background, version): (Option<usize>, u32),
-        moving: bool,
+        (moving, walls): (bool, &[FixedSides]),
     ) -> Result<(), EmptyCell> {
+        if let Some(fill) = &mut self.fill {
+            fill.update(mesh, particles, &self.factors, walls);
+        }
+        let fill = self.fill.as_ref();
         threads::for_each(&mut self.found, GRAIN, |cell, found| {
             *found = if mesh.solid[cell] {
                 Some(Content::Solid)
+            } else if fill.is_some_and(|fill| fill.of(cell) == 0.0) {
+                Some(Content::Empty)
+            } else if fill.is_some_and(|fill| fill.void_in(cell).is_some()) {
+                Some(Content::Mixed)
             } else {
                 content(particles, cell, kinds, background, version)
             };
@@ -202,8 +234,9 @@ impl Composition {
             [if mesh.solid[cell] { 0.0 } else { mesh.cell_volume(cell) }]
         });
         let [volume] = threads::sum(0..particles.len(), |p| [particles.volume[p]]);
-        let scale = area / volume;
-        for m in 0..self.materials {
+        let void = self.fill.as_ref().map(Fill::void);
+        let scale = if void.is_some() { 1.0 } else { area / volume };
+        for m in (0..self.materials).filter(|&m| Some(m) != void) {
             let [projected, response] = threads::sum(0..mesh.cells(), |cell| {
                 let (phi, area) = (self.fraction(cell, m), mesh.cell_volume(cell));
                 // The fractions of a solid cell are zero.

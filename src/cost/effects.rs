@@ -70,7 +70,7 @@ pub fn without(scene: &Scene, effect: EffectKind) -> Option<Scene> {
             s.materials.values_mut().for_each(|m| m.micro_inertia = None);
         }
         EffectKind::Slip | EffectKind::Inflow => return None,
-        EffectKind::Solids | EffectKind::Moving => return None,
+        EffectKind::Solids | EffectKind::Moving | EffectKind::Void => return None,
     }
     // The quantity of interest may have been removed with the effect.
     s.interest = None;
@@ -139,7 +139,7 @@ pub fn measure(plan: &Arc<Plan>, list: &mut EffectList, steps: u32) -> Result<()
             EffectKind::Flow | EffectKind::CarriedDensity | EffectKind::CarriedViscosity => None,
             EffectKind::FlowCurves | EffectKind::PressureZero | EffectKind::Inertia => None,
             EffectKind::Slip | EffectKind::Inflow => None,
-            EffectKind::Solids | EffectKind::Moving => None,
+            EffectKind::Solids | EffectKind::Moving | EffectKind::Void => None,
             // Computed once, at the start.
             EffectKind::BodyForce => Some(0.0),
             EffectKind::Gravity | EffectKind::Acceleration => Some(phases.weight / total),

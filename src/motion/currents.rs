@@ -29,10 +29,19 @@ impl Currents {
         }
     }
 
-    /// Sets the velocities of all cells from their nodal velocities.
-    pub fn update(&mut self, mesh: &Mesh, nodal: impl Fn(usize) -> [[f64; 2]; NODES] + Sync) {
+    /// Sets the velocities of all cells from their nodal velocities; those that are `divergent` keep their
+    /// divergence.
+    pub fn update(
+        &mut self,
+        mesh: &Mesh,
+        divergent: &[bool],
+        nodal: impl Fn(usize) -> [[f64; 2]; NODES] + Sync,
+    ) {
         // Beside a solid it vanishes on the outline; corrected, it would not.
-        let corrected = |cell| mesh.part(cell).is_none() && mesh.solid_velocity(cell).is_none();
+        let corrected = |cell| {
+            let keeps = divergent.get(cell).is_some_and(|&keeps| keeps);
+            !keeps && mesh.part(cell).is_none() && mesh.solid_velocity(cell).is_none()
+        };
         match self {
             Currents::Plane(cells) => threads::for_each(cells, CELL_GRAIN, |cell, current| {
                 let nodal = nodal(cell);

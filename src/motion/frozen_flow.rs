@@ -24,6 +24,9 @@ pub struct CellVelocities {
     /// Whether no wall, side of the domain or periodic seam lies between the points of the 3 x 3
     /// cells around the cell.
     free: Vec<bool>,
+    /// Cells whose velocity keeps its divergence, because a material fills them only in part; empty without
+    /// a void.
+    divergent: Vec<bool>,
 }
 
 impl CellVelocities {
@@ -32,7 +35,13 @@ impl CellVelocities {
         let free = (0..mesh.cells()).map(|cell| is_free(mesh, enclosure, cell)).collect();
         let edges = if kinked { vec![None; mesh.cells()] } else { Vec::new() };
         let streams = vec![None; if mesh.parts().is_some() { mesh.cells() } else { 0 }];
-        CellVelocities { cells: Currents::new(mesh), edges, streams, free }
+        CellVelocities { cells: Currents::new(mesh), edges, streams, free, divergent: vec![] }
+    }
+
+    /// Keeps the divergence of the velocity in some cells.
+    pub fn keep_divergence(&mut self, of: impl Fn(usize) -> bool) {
+        self.divergent.clear();
+        self.divergent.extend((0..self.free.len()).map(of));
     }
 }
 
@@ -155,7 +164,7 @@ impl<'a> FrozenFlow<'a> {
         kinks: &Kinks,
         dt: f64,
     ) -> Self {
-        let CellVelocities { cells, edges, streams, free } = velocities;
+        let CellVelocities { cells, edges, streams, free, divergent } = velocities;
         let of_nodes = |cell| mesh.cell_nodes(cell).map(|n| velocity[n]);
         threads::for_each(edges, CELL_GRAIN, |cell, edge| {
             *edge = kinks(cell, &of_nodes(cell))
@@ -166,7 +175,7 @@ impl<'a> FrozenFlow<'a> {
             let thickness = |n: usize| mesh.thickness(mesh.node_position(n));
             *stream = of.map(|s| s.flow(&of_nodes(cell), &mesh.cell_nodes(cell).map(thickness)));
         });
-        cells.update(mesh, |cell| {
+        cells.update(mesh, divergent, |cell| {
             let mut nodal = of_nodes(cell);
             if let Some(Some(Edge { kink, jump })) = edges.get(cell) {
                 for (u, psi) in nodal.iter_mut().zip(kink.biquadratic()) {

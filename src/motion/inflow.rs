@@ -60,27 +60,30 @@ struct Entry {
 impl Inflow {
     /// The faces of a plan through which it is known what enters; `None` if there are none.
     pub fn new(plan: &Plan) -> Option<Inflow> {
-        let mesh = &plan.mesh;
+        let (mesh, void) = (&plan.mesh, plan.void());
         let mut out =
             Inflow { faces: vec![], entering: vec![], particles_along: plan.method.seeding.side };
         for (side, piece) in plan.boundary.pieces() {
             let Some(entering) = &piece.enters else { continue };
             let cells = piece.segment.cells_at_side(mesh, side).map(|(_, cell)| cell);
-            out.add_faces(mesh, entering, cells.map(|cell| (cell, side)));
+            out.add_faces((mesh, void), entering, cells.map(|cell| (cell, side)));
         }
         for source in &plan.boundary.sources {
-            out.add_faces(mesh, &source.entering, source.faces(mesh));
+            out.add_faces((mesh, void), &source.entering, source.faces(mesh));
         }
         (!out.faces.is_empty()).then_some(out)
     }
 
-    /// Adds faces, which are sides of cells.
+    /// Adds faces, which are sides of cells, unless a void would enter.
     fn add_faces(
         &mut self,
-        mesh: &Mesh,
+        (mesh, void): (&Mesh, Option<u8>),
         entering: &Entering,
         faces: impl Iterator<Item = (usize, usize)>,
     ) {
+        if void == Some(entering.material) {
+            return;
+        }
         self.entering.push(entering.clone());
         let entering = self.entering.len() - 1;
         let faces = faces.filter(|&(cell, _)| !mesh.solid[cell]);

@@ -29,6 +29,8 @@ pub enum EffectKind {
     Gauges,
     /// Cells that contain several materials.
     CutCells,
+    /// Nothing around the materials.
+    Void,
     /// Viscosities that depend on the flow: friction, a yield stress or a flow index.
     FlowCurves,
     /// The zero of the pressure of a closed domain.
@@ -65,6 +67,7 @@ impl EffectKind {
             Dye => "dye lines",
             Gauges => "gauges",
             CutCells => "cut cells",
+            Void => "void around the materials",
             FlowCurves => "flow curves",
             PressureZero => "the zero of the pressure",
             Inertia => "inertia",

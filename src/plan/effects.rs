@@ -312,6 +312,8 @@ impl Plan {
             0,
             &[],
         );
+        let no = "no `background = \"void\"`";
+        add(Void, e.void, why(e.void, "`background = \"void\"`".into(), no), 0, 0, &["surface"]);
         let no = "no material has friction, a yield stress or a flow index";
         let stage = "iterations of the flow curves";
         add(FlowCurves, e.flow_curves, why(e.flow_curves, self.curves(), no), 0, 0, &[stage]);

@@ -160,6 +160,8 @@ pub struct EffectSet {
     pub gravity: bool,
     /// A law depends on the flow: friction, a yield stress or a power law.
     pub flow_curves: bool,
+    /// Nothing is around the materials.
+    pub void: bool,
     /// Inertia acts on the materials with density.
     pub inertia: bool,
     /// Inertia acts on the rotation too.
@@ -373,7 +375,7 @@ impl Plan {
     /// [`Quadrature::Laminate`].
     pub fn rule_of_cells(&self) -> Quadrature {
         match self.method.quadrature {
-            Quadrature::Sides if !self.has_mass() => Quadrature::Laminate,
+            Quadrature::Sides if !self.has_mass() && !self.effects.void => Quadrature::Laminate,
             rule => rule,
         }
     }

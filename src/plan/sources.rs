@@ -4,6 +4,7 @@ use super::Plan;
 use crate::scene::FieldFn;
 use crate::space::constraints::Constraints;
 use crate::space::mesh::Mesh;
+use crate::space::population::Surrounding;
 use crate::space::segment::Segment;
 
 /// Times that differ by less than this share of the run are one, as in the plan's stops.
@@ -58,6 +59,19 @@ impl Plan {
     /// Index of the background material, which fills the part of the domain outside all regions.
     pub fn background(&self) -> Option<u8> {
         self.state.materials.iter().position(|m| m.background).map(|m| m as u8)
+    }
+
+    /// Index of the material that stands for a void around the materials, if there is one.
+    pub fn void(&self) -> Option<u8> {
+        self.background().filter(|_| self.effects.void)
+    }
+
+    /// What fills cells without particles.
+    pub fn around(&self) -> Surrounding {
+        match self.void() {
+            Some(_) => Surrounding::Void,
+            None => Surrounding::Material(self.background()),
+        }
     }
 
     /// Which sources are on after a time, in the plan's units.

@@ -11,7 +11,7 @@ use super::source::SceneSource;
 use crate::words::count;
 
 /// The keys of a scene with which a path may start.
-const KEYS: [&str; 25] = [
+const KEYS: [&str; 26] = [
     "schema",
     "name",
     "description",
@@ -24,6 +24,7 @@ const KEYS: [&str; 25] = [
     "accuracy",
     "time",
     "materials",
+    "background",
     "regions",
     "boundaries",
     "walls",

@@ -51,6 +51,14 @@ pub struct Scene {
     pub time: Time,
     /// Materials by name.
     pub materials: IndexMap<String, Material>,
+    /// What is around the materials: `"void"`, nothing. The material with `background = true` is then not
+    /// solved for, and may be left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend(
+        "x-default" = "the material with `background = true`",
+        "examples" = ["void"]
+    ))]
+    pub background: Option<Background>,
     /// Regions that are filled with materials at the start; where they overlap, the last one
     /// counts.
     #[serde(default)]
@@ -92,6 +100,14 @@ pub struct Scene {
     /// Changes of materials, gravity or parameters during the run.
     #[serde(default)]
     pub schedule: Vec<Change>,
+}
+
+/// What is around the materials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Background {
+    /// Nothing: no unknowns, no particles, no traction on the surface of the materials.
+    Void,
 }
 
 /// A named number with its range, label and unit.

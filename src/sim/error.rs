@@ -78,6 +78,21 @@ pub enum SimError {
         /// Coordinate y, m.
         y: f64,
     },
+    /// Beside a void, material that nothing holds has no creeping flow.
+    #[error(
+        "step {step}, t = {time:.6e} s: nothing holds the material near x = {x:.4e}, y = {y:.4e}, and \
+         nothing is around it"
+    )]
+    Falls {
+        /// Number of the step.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// Coordinate x, m.
+        x: f64,
+        /// Coordinate y, m.
+        y: f64,
+    },
     /// The step failed with every shorter length that was tried.
     #[error("{source}; the {}", tried(*.cuts))]
     Cut {
@@ -143,6 +158,10 @@ impl SimError {
             SimError::Trapped { .. } => {
                 "stop the block before it closes (velocity = \"v*(t < t_end)\"), leave an opening, or give \
                  the material a bulk_viscosity"
+            }
+            SimError::Falls { .. } => {
+                "without inertia it would fall at any speed: set `inertia = true`, let it touch a side along \
+                 which the velocity is given, or surround it with a material that has `background = true`"
             }
             SimError::Fault { fault, .. } => fault.remedy(),
             SimError::Cut { source, .. } => source.remedy(),

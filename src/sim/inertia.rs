@@ -131,6 +131,11 @@ impl Inertia {
         }
     }
 
+    /// Keeps the divergence of the velocity with which points are traced back in some cells.
+    pub fn keep_divergence(&mut self, of: impl Fn(usize) -> bool) {
+        self.backwards.iter_mut().for_each(|velocities| velocities.keep_divergence(&of));
+    }
+
     /// Nodal rotations of a flow, if they have inertia.
     pub fn rotation_of<const D: usize>(&self, flow: &Flow<D>) -> Vec<[f64; 1]> {
         let turns = self.turning.is_some();

@@ -12,7 +12,7 @@ use crate::scene::FieldFn;
 use crate::space::count::Count;
 use crate::space::measure::CellMeasure;
 use crate::space::particles::Particles;
-use crate::space::population::Population;
+use crate::space::population::{Population, Surrounding};
 use rand::Rng;
 use rand_pcg::Pcg64;
 
@@ -74,6 +74,7 @@ pub fn particles(plan: &Plan) -> Result<(Particles, Vec<usize>), Unfilled> {
             let samples = samples(plan, cell);
             divide(plan, cell, &samples, &mut members);
         }
+        members.retain(|m| Some(m.material) != plan.void());
         let (i, j) = mesh.cell_ij(cell);
         let angles = spread_angles(members.len(), [i, j], start, &mut random);
         let first = out.len();
@@ -118,7 +119,8 @@ fn places(plan: &Plan) -> Particles {
         positions.into_iter().for_each(|p| out.push(p, volume, 0));
     }
     out.sort(mesh);
-    Population::new(mesh, &plan.enclosure, plan.method.seeding, plan.background()).control(
+    let around = Surrounding::Material(plan.background());
+    Population::new(mesh, &plan.enclosure, plan.method.seeding, around).control(
         mesh,
         &mut out,
         &mut Count::default(),
@@ -170,7 +172,7 @@ fn divide(plan: &Plan, cell: usize, samples: &[Sample], members: &mut Vec<Member
             members.extend(lone(plan, cell, samples, (m as u8, centroid, share)));
             continue;
         }
-        // Around an axis a shift changes the volumes of the rings, so it is repeated.
+        // Surrounding an axis a shift changes the volumes of the rings, so it is repeated.
         let mut off = [f64::INFINITY; 2];
         for _ in 0..SHIFTS {
             if off.iter().all(|o| o.abs() < CENTRED) {

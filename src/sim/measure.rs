@@ -105,6 +105,12 @@ impl<const D: usize> Simulation<D> {
         all.map(crossed).fold(0.0, f64::max)
     }
 
+    /// Whether a node has a velocity of a material: it is not inside of a solid, and no cell around it is
+    /// left out.
+    fn moves(&self, node: usize) -> bool {
+        !self.reach.inside(node) && !(self.plan.effects.void && self.stokes.is_left_out(node))
+    }
+
     /// Projected area of a material over the volume of its particles.
     pub(super) fn projected_share(&self, material: usize) -> f64 {
         let volume = self.particles.volume_of(material);
@@ -174,7 +180,8 @@ impl<const D: usize> Simulation<D> {
         let mesh = &self.plan.mesh;
         let [sum, cells] = threads::sum(0..mesh.cells(), |cell| {
             let range = self.particles.of_cell(cell);
-            if range.is_empty() {
+            let void = self.quadrature.composition().void_in(cell);
+            if range.is_empty() || void.is_some() {
                 return [0.0; 2];
             }
             let volume: f64 = self.particles.volume[range].iter().sum();
@@ -272,8 +279,8 @@ impl<const D: usize> Simulation<D> {
             nonlinear: r.iterations,
             ill_posed_share,
             kinetic_energy,
-            max_speed: self.flow.max_speed_of(|node| !self.reach.inside(node)) * u.velocity(),
-            rms_speed: self.flow.rms_speed(&plan.mesh) * u.velocity(),
+            max_speed: self.flow.max_speed_of(|node| self.moves(node)) * u.velocity(),
+            rms_speed: self.flow.rms_speed(self.stokes.mesh()) * u.velocity(),
             volume_error: self.volume_error(),
             potential_energy,
             work,

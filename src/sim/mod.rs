@@ -37,6 +37,7 @@ mod solution;
 mod sources;
 pub mod state;
 mod step;
+mod void;
 mod yielding;
 
 pub use error::SimError;

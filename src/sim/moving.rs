@@ -123,7 +123,7 @@ impl<const D: usize> Simulation<D> {
         }
         self.crossing_rates = clock::crossing_rates(mesh);
         self.population =
-            Population::new(mesh, &plan.enclosure, plan.method.seeding, plan.background());
+            Population::new(mesh, &plan.enclosure, plan.method.seeding, plan.around());
         self.inflow = Inflow::new(&plan);
         self.fixed_load = plan.fixed_loads::<D>();
         self.load.clone_from(&self.fixed_load);

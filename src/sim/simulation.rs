@@ -8,6 +8,7 @@ use super::interest::Interest;
 use super::phases::Phases;
 use super::reach::Reach;
 use super::row::Row;
+use crate::composition::fill::Fill;
 use crate::motion::advect::Displacements;
 use crate::motion::frozen_flow::CellVelocities;
 use crate::motion::gauges::Counter;
@@ -140,9 +141,13 @@ impl<const D: usize> Simulation<D> {
             Quadrature::new(&mesh, plan.rule_of_cells(), plan.state.materials.len());
         quadrature.bind_walls(|cell| constraints.fixed_sides(&mesh, cell));
         quadrature.bind_slip(&mesh, &plan.boundary, &plan.units);
+        if let Some(void) = plan.void() {
+            let fill = Fill::new(usize::from(void), plan.effects.inertia, mesh.cells());
+            quadrature.composition_mut().leave_void(fill);
+        }
         let stokes = Stokes::new(mesh.clone(), constraints);
         let population =
-            Population::new(&mesh, &plan.enclosure, plan.method.seeding, plan.background());
+            Population::new(&mesh, &plan.enclosure, plan.method.seeding, plan.around());
         let (particles, empty) = initial::particles(&plan)?;
         let fixed_load = plan.fixed_loads::<D>();
         let mut sim = Simulation {

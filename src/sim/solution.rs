@@ -44,6 +44,7 @@ impl<const D: usize> Simulation<D> {
                 source.y *= plan.units.length;
                 SimError::Empty { step, time, source }
             })?;
+        self.leave_out_void()?;
         let background = self.plan.background();
         let entering = self.inflow.iter().flat_map(|i| i.cells_of_interest(background));
         self.interest.update(&plan.mesh, self.quadrature.composition(), background, entering);
@@ -74,6 +75,7 @@ impl<const D: usize> Simulation<D> {
             stokes.reactions(quadrature, loads, flow, &mut self.reactions);
         }
         self.separate_inertia();
+        self.continue_into_void();
         seconds.assemble += self.report.seconds.assemble;
         seconds.factor += self.report.seconds.factor;
         seconds.solve += self.report.seconds.solve;

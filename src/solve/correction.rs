@@ -35,7 +35,7 @@ impl<const D: usize> Stokes<D> {
             let p: [f64; 3] =
                 std::array::from_fn(|q| -matrix.penalty[q] * residual.divergence[cell][q]);
             let mut force = [[0.0; D]; NODES];
-            Divergence::new(mesh, cell).add_transposed(&p, &mut force);
+            Divergence::new(mesh, quadrature, cell).add_transposed(&p, &mut force);
             if let Some(map) = map(cell) {
                 reduce(&mut force, map);
             }
@@ -88,14 +88,17 @@ impl<const D: usize> Stokes<D> {
             if let Some(map) = map(cell) {
                 expand(&mut du, map);
             }
-            let mass = mesh.cell_measure(cell).pressure_mass();
-            let bdu = Divergence::new(mesh, cell).apply(&du);
+            let divergence = Divergence::new(mesh, quadrature, cell);
+            let mass = divergence.mass(mesh.cell_measure(cell));
+            let bdu = divergence.apply(&du);
             let compliance = quadrature.compliance[cell] + loose.compliance(mesh, quadrature, cell);
             for q in 0..3 {
                 let dp = -matrix.penalty[q] * (residual.divergence[cell][q] + bdu[q]);
                 share.sums[q] = dp;
                 share.divergence[q] = bdu[q] + compliance * mass[q] * dp;
             }
+            let dp = divergence.monomials([0, 1, 2].map(|q| share.sums[q]));
+            share.sums[..3].copy_from_slice(&dp);
         });
         correction.pressure.resize(mesh.cells(), [0.0; 3]);
         correction.divergence.resize(mesh.cells(), [0.0; 3]);

@@ -152,6 +152,9 @@ impl Density {
                 }
                 Content::Mixed => {
                     self.gather(mesh, cell, particles, materials);
+                    if let Some(void) = quadrature.composition().void_in(cell) {
+                        self.centroids.add_void(void, quadrature.composition().factors());
+                    }
                     self.help(mesh, cell, particles, materials);
                     let viscosity = materials.iter().map(|m| m.viscosity);
                     self.centroids.finish(quadrature.composition().factors(), viscosity);
@@ -174,7 +177,7 @@ impl Density {
                     }
                     linear
                 }
-                Content::Solid | Content::Unknown => [0.0; 9],
+                Content::Empty | Content::Solid | Content::Unknown => [0.0; 9],
             };
         }
     }

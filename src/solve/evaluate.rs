@@ -2,11 +2,12 @@
 //! mixtures and laminates, from the [`composition`](crate::composition) of the cell.
 
 use super::cells::CellMut;
+use super::filled::Filled;
 use super::form::Form;
 use super::laminate::{self, Cut};
 use super::last_flow::LastFlow;
 use super::local_laws::Evaluation;
-use super::points::{CutStiffness, IntegrationPoint, Place};
+use super::points::{CutStiffness, IntegrationPoint, Place, VOID};
 use super::sides::{self, Sides};
 use crate::composition::interface::Interface;
 use crate::composition::straight::StraightCut;
@@ -20,7 +21,7 @@ use crate::scene::Quadrature as Rule;
 use crate::space::kink::Ramp;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
-use crate::space::shape::GAUSS_6X6;
+use crate::space::shape::{GAUSS_6X6, NODES};
 
 /// Law of a material whose particles are all alike.
 pub fn uniform(m: &Material) -> PointLaw {
@@ -46,6 +47,14 @@ impl Evaluation<'_> {
             }
             Content::Flowing { material } => self.flow(cell, usize::from(material), &mut out),
             Content::Mixed => self.mix(cell, &mut out, kept, scratch),
+            Content::Empty => {
+                (*out.mean_viscosity, *out.compliance) = (0.0, 0.0);
+                out.fractions.fill(0.0);
+                if let Some(fill) = self.fill {
+                    out.fractions[fill.void()] = 1.0;
+                }
+                out.points.iter_mut().for_each(|p| p.law = PointLaw::default());
+            }
             Content::Solid | Content::Unknown => {}
         }
     }
@@ -82,6 +91,10 @@ impl Evaluation<'_> {
         scratch: &mut Gathered,
     ) {
         scratch.gather(self.mesh, cell, self.particles, self.kinds);
+        let void = self.void_in(cell);
+        if let Some(void) = void {
+            scratch.add_void(void, self.factors);
+        }
         scratch.fit_viscosities();
         let form = match self.rule {
             // The arrangement next to a solid is not known.
@@ -102,9 +115,9 @@ impl Evaluation<'_> {
             Form::Mixture if scratch.is_of_one_material() => 1.0,
             Form::Cut { .. } | Form::Drops { .. } | Form::Mixture => 0.0,
         };
-        let film = matches!(form, Form::Film);
+        let even = matches!(form, Form::Film) || void.is_some();
         let shares =
-            |m: usize, g: usize| if film { scratch.mean_share(m) } else { scratch.share(m, g) };
+            |m: usize, g: usize| if even { scratch.mean_share(m) } else { scratch.share(m, g) };
         self.points(cell, out, (scratch, &shares), (mixture, softened));
         let cut = match form {
             Form::Cut { interface, between } => {
@@ -118,8 +131,14 @@ impl Evaluation<'_> {
                 cut
             }
             Form::Sides { cut, between } => self.sides(cell, cut, between, (scratch, out)),
-            Form::Film | Form::Weights | Form::Drops { .. } | Form::Mixture => return,
+            Form::Film | Form::Weights | Form::Drops { .. } | Form::Mixture => match void {
+                Some((_, share)) => self.spread(cell, 1.0 - share),
+                None => return,
+            },
         };
+        if let Some((_, share)) = void {
+            *out.mean_viscosity /= 1.0 - share;
+        }
         *out.cut = Some(match kept {
             Some(mut kept) => {
                 *kept = cut;
@@ -127,6 +146,13 @@ impl Evaluation<'_> {
             }
             None => Box::new(cut),
         });
+    }
+
+    /// A cell that is filled in part, nowhere in particular.
+    fn spread(&self, cell: usize, fill: f64) -> CutStiffness {
+        let matrix = [[0.0; 2 * NODES]; 2 * NODES];
+        let filled = Some(Filled::uniform(fill, self.mesh.cell_measure(cell)));
+        CutStiffness { matrix, rest: 1.0, sides: None, filled }
     }
 
     /// Stiffness of a cell of two materials with an interface.
@@ -141,7 +167,7 @@ impl Evaluation<'_> {
         let cut = Cut { interface, sides: &sides, cell: self.mesh.cell_measure(cell) };
         let mut matrix = laminate::matrix(&cut);
         matrix.iter_mut().flatten().for_each(|k| *k *= interface.trust);
-        CutStiffness { matrix, rest: 1.0 - interface.trust, sides: None }
+        CutStiffness { matrix, rest: 1.0 - interface.trust, sides: None, filled: None }
     }
 
     /// Stiffness of a cell of two materials on the two sides of a line. Each material has its law
@@ -155,32 +181,46 @@ impl Evaluation<'_> {
         (scratch, out): (&Gathered, &mut CellMut),
     ) -> CutStiffness {
         let measure = self.mesh.cell_measure(cell);
+        let void = self.void_in(cell).map(|(m, share)| (usize::from(between[1] == m), share));
+        // Where one side is void, it has a part of the viscosities of the other.
+        let with_void = |laws: [PointLaw; 2]| match void {
+            Some((side, _)) => {
+                let mut out = laws;
+                out[side] = laws[1 - side].scaled(VOID);
+                out
+            }
+            None => laws,
+        };
         let flows = |m: usize| self.materials[m].law.depends_on().needs_flow();
         let (mut matrix, kinked) = if between.into_iter().any(flows) {
             let laws = std::array::from_fn(|q| {
                 let g = &GAUSS_6X6[q];
                 let shares = sides::bounded(cut.share[q]);
-                [0, 1].map(|side| {
+                with_void([0, 1].map(|side| {
                     let (m, share) = (between[side], shares[side]);
                     let eta = self.viscosity(m, g.r, scratch);
                     let here = self.here((cell, g.r), m, eta, scratch.cell_orientation(m));
                     let (law, softening) = self.materials[m].law.with_softening(&here);
-                    if share > 0.0 {
+                    if share > 0.0 && void.is_none_or(|(side_of_void, _)| side_of_void != side) {
                         // The integration points have the stresses of the rotation.
                         let softening = softening.map(Softening::of_shear);
                         let weight = measure.share(g.weight, g.r[0]) * share * cut.trust;
                         out.soften(Place::Fine(q as u8), weight, softening);
                     }
                     law
-                })
+                }))
             });
             (sides::varying(&cut, &laws, measure), None)
         } else {
-            let laws = between.map(|m| self.law_at_centre(cell, m, scratch));
-            sides::matrix(&cut, &laws, measure, Ramp::new(self.walls[cell].any))
+            let laws = with_void(between.map(|m| self.law_at_centre(cell, m, scratch)));
+            let ramp = Ramp::new(self.walls[cell].any).filter(|_| void.is_none());
+            sides::matrix(&cut, &laws, measure, ramp)
         };
         matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);
-        CutStiffness { matrix, rest: 1.0 - cut.trust, sides: Some(Sides { between, cut, kinked }) }
+        let filled =
+            void.map(|(side, share)| Filled::of_side((&cut, 1 - side), 1.0 - share, measure));
+        let rest = 1.0 - cut.trust;
+        CutStiffness { matrix, rest, sides: Some(Sides { between, cut, kinked }), filled }
     }
 
     /// Mean of the viscosities of the cell's materials, weighted by volume.
@@ -207,6 +247,10 @@ impl Evaluation<'_> {
             for (m, material) in self.materials.iter().enumerate() {
                 let phi = share(m, g);
                 if phi == 0.0 {
+                    continue;
+                }
+                if self.fill.is_some_and(|fill| fill.void() == m) {
+                    out.fractions[m] += weight * phi;
                     continue;
                 }
                 let eta = self.viscosity(m, r, scratch);

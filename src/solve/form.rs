@@ -29,7 +29,9 @@ pub enum Form {
 impl Evaluation<'_> {
     /// Arrangement of the materials in a gathered cell.
     pub(super) fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
-        if self.rule == Rule::Sides && self.densities_differ(scratch.volumes()) {
+        if self.rule == Rule::Sides
+            && (self.void_in(cell).is_some() || self.densities_differ(scratch.volumes()))
+        {
             let Some(between) = present(scratch.volumes()) else { return Form::Weights };
             let viscosity = self.materials.iter().map(|m| m.viscosity);
             let centroids =

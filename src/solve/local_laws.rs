@@ -2,6 +2,7 @@
 //! of a cell.
 
 use super::last_flow::LastFlow;
+use crate::composition::fill::Fill;
 use crate::composition::{Content, Gathered, Kind};
 use crate::laws::Here;
 use crate::laws::director::Orientation;
@@ -28,6 +29,8 @@ pub struct Evaluation<'a> {
     pub kinds: &'a [Kind],
     /// Content of each cell.
     pub content: &'a [Content],
+    /// Filled shares of the cells, if a void is around the materials.
+    pub fill: Option<&'a Fill>,
     /// Factor on each material's volume in cut cells.
     pub factors: &'a [f64],
     /// Sides of each cell on which the velocity is prescribed.
@@ -37,6 +40,11 @@ pub struct Evaluation<'a> {
 }
 
 impl Evaluation<'_> {
+    /// The material that stands for a void and its share, in a cell that is filled in part.
+    pub(super) fn void_in(&self, cell: usize) -> Option<(usize, f64)> {
+        self.fill?.void_in(cell)
+    }
+
     /// State of a material at a point of a cell.
     pub(super) fn here<'o>(
         &self,

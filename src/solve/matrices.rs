@@ -22,7 +22,8 @@ use crate::threads;
 const PENALTY: f64 = 1e6;
 
 /// The same for cells whose viscosity depends on the flow: their iteration reduces the divergence
-/// further in each step, and a smaller penalty leaves more digits for thin fluid next to them.
+/// further in each step, and a smaller penalty leaves more digits for thin fluid next to them. Also for
+/// cells that a material fills in part: of a sliver, a larger penalty leaves fewer digits.
 const FLOWING_PENALTY: f64 = 1e4;
 
 /// Largest number of cells per task.
@@ -162,7 +163,7 @@ impl<const D: usize> Matrices<D> {
             // The penalty of a cell with a solid in it depends on its neighbours.
             let alone = from.mesh.part(cell).is_none() && !from.loose.contains(cell);
             let known = content.is_constant() && content == *built_from && alone;
-            if content != Content::Solid && !known {
+            if !matches!(content, Content::Solid | Content::Empty) && !known {
                 let blocks = Self::NO_BLOCKS;
                 let matrix = CellMatrix::ZERO;
                 let rotation = self.rotation[cell].take();
@@ -243,15 +244,16 @@ impl<const D: usize> Fresh<D> {
             }
         }
         quadrature.slip_outlines().add_stiffness(cell, &mut k);
-        let mass = measure.pressure_mass();
+        let divergence = Divergence::new(mesh, quadrature, cell);
+        let mass = divergence.mass(measure);
         let viscosity = stiffness(mesh, quadrature, cell)
             + if D == 3 { turning } else { 0.0 }
             + terms.inertia.resistance(cell, measure.volume(), size[0].max(size[1]));
-        let penalty = if quadrature.flows(cell) { FLOWING_PENALTY } else { PENALTY };
+        let soft = quadrature.flows(cell) || divergence.is_of_filled_part();
+        let penalty = if soft { FLOWING_PENALTY } else { PENALTY };
         let compliance = 1.0 / (penalty * viscosity)
             + quadrature.compliance[cell]
             + loose.compliance(mesh, quadrature, cell);
-        let divergence = Divergence::new(mesh, cell);
         self.matrix.penalty = mass.map(|m| 1.0 / (m * compliance));
         for (penalty, unknown) in self.matrix.penalty.iter_mut().zip(divergence.unknown()) {
             if !unknown {

@@ -6,6 +6,7 @@ mod correction;
 pub mod density;
 pub mod element;
 pub mod evaluate;
+mod filled;
 mod form;
 pub mod laminate;
 pub mod last_flow;

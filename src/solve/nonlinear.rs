@@ -185,7 +185,7 @@ impl<const D: usize> Stokes<D> {
         let mut updates = 0;
         loop {
             let clock = Instant::now();
-            self.constraints.remove_null_space(&self.mesh, flow);
+            self.remove_null_space(flow);
             flow.continue_slopes(&self.mesh, loads.weight, &quadrature.mean_viscosity);
             let near = report.decrement.is_some_and(|d| d <= NEAR) && updates < most_updates;
             if near {

@@ -43,6 +43,8 @@ pub struct Stokes<const D: usize> {
     pub(super) work: Work<D>,
     /// Cells that may change their volume.
     pub(super) loose: Loose,
+    /// Whether a void is around the materials; its cells are solid in the mesh of the problem.
+    pub(super) void: bool,
 }
 
 /// Loads that drive a solution.

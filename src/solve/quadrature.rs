@@ -22,6 +22,7 @@
 //! to its volume: the method of the source paper, for comparison.
 
 use super::cells::CellsMut;
+use super::filled::Filled;
 use super::last_flow::LastFlow;
 use super::local_laws::Evaluation;
 use super::points::{CutStiffness, INSIDE_SOLIDS, IntegrationPoint};
@@ -224,6 +225,11 @@ impl Quadrature {
         });
     }
 
+    /// Divergence of the filled part of a cell with a void in it.
+    pub fn filled(&self, cell: usize) -> Option<&Filled> {
+        self.cut(cell)?.filled.as_ref()
+    }
+
     /// Kink of the velocity in a cell, if it has one.
     pub fn kinked(&self, cell: usize) -> Option<&Kinked> {
         self.cut(cell)?.kinked()
@@ -291,8 +297,8 @@ impl Quadrature {
         // Particles as integration points move, so the matrix of a cell with particles always
         // changes.
         let moving = self.rule == Rule::Particles;
-        let Quadrature { composition, kinds, .. } = self;
-        composition.update(mesh, particles, kinds, (background, version), moving)?;
+        let Quadrature { composition, kinds, walls, .. } = self;
+        composition.update(mesh, particles, kinds, (background, version), (moving, walls))?;
         if self.rule == Rule::Particles {
             self.points.clear();
             for cell in 0..mesh.cells() {
@@ -332,7 +338,9 @@ impl Quadrature {
             match composition.content(cell) {
                 Content::Flowing { .. } => true,
                 Content::Mixed => flows.iter().any(|&m| composition.fraction(cell, m) > 0.0),
-                Content::Uniform { .. } | Content::Solid | Content::Unknown => false,
+                Content::Uniform { .. } | Content::Empty | Content::Solid | Content::Unknown => {
+                    false
+                }
             }
         });
     }
@@ -371,6 +379,7 @@ impl Quadrature {
             materials,
             kinds,
             content: composition.contents(),
+            fill: composition.fill(),
             factors,
             walls,
             flow,

@@ -141,11 +141,11 @@ impl<const D: usize> Stokes<D> {
     ) {
         let nodes = &self.incidence.nodes[cell];
         let u = nodes.map(|n| flow.velocity[n]);
-        let divergence = Divergence::new(&self.mesh, cell);
-        let mass = self.mesh.cell_measure(cell).pressure_mass();
+        let divergence = Divergence::new(&self.mesh, quadrature, cell);
+        let mass = divergence.mass(self.mesh.cell_measure(cell));
         let weights = self.mesh.divergence_mass(cell);
         let relations = self.constraints.embedding();
-        let pressure = flow.pressure[cell];
+        let pressure = divergence.coefficients(flow.pressure[cell]);
         let compliance =
             quadrature.compliance[cell] + self.loose.compliance(&self.mesh, quadrature, cell);
         let mut force = [[0.0; D]; NODES];

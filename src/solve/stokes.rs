@@ -79,6 +79,7 @@ impl<const D: usize> Stokes<D> {
             simd: Simd::used(),
             work: Work::default(),
             loose: Loose::default(),
+            void: false,
             mesh,
             constraints,
         }
@@ -87,6 +88,39 @@ impl<const D: usize> Stokes<D> {
     /// Changes the prescribed values; the same unknowns must be prescribed as before.
     pub fn prescribe(&mut self, constraints: Constraints<D>) {
         self.constraints = constraints;
+    }
+
+    /// Leaves the cells that `is_empty` out of the problem: their nodes have no unknowns unless another cell
+    /// has them too.
+    pub fn leave_out(&mut self, mesh: &Mesh, is_empty: impl Fn(usize) -> bool) {
+        let left_out = |cell: usize| mesh.solid[cell] || is_empty(cell);
+        self.void = true;
+        if (0..mesh.cells()).all(|cell| self.mesh.solid[cell] == left_out(cell)) {
+            return;
+        }
+        let mut occupied = mesh.clone();
+        occupied.solid.iter_mut().enumerate().for_each(|(cell, out)| *out = left_out(cell));
+        let Symbolic { tree, incidence } = Symbolic::new(&occupied);
+        self.factor = Multifrontal::new(tree, mesh.cells());
+        self.incidence = incidence;
+        self.mesh = Arc::new(occupied);
+        // Vectors keep what they have for cells that are left out.
+        self.work = Work::default();
+    }
+
+    /// The mesh of the problem, in which cells without material are solid.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// Whether all cells of a node are left out.
+    pub fn is_left_out(&self, node: usize) -> bool {
+        self.incidence.of_node(node).next().is_none()
+    }
+
+    /// Sets the prescribed components to their values.
+    pub fn impose(&self, velocity: &mut [[f64; D]]) {
+        self.constraints.impose(velocity);
     }
 
     /// Whether a velocity other than zero is prescribed.
@@ -160,7 +194,7 @@ impl<const D: usize> Stokes<D> {
             }
         }
         let clock = Instant::now();
-        self.constraints.remove_null_space(&self.mesh, flow);
+        self.remove_null_space(flow);
         report.seconds.solve += clock.elapsed().as_secs_f64();
         report.loose = self.loose.count();
         Ok(report)
@@ -298,10 +332,18 @@ impl<const D: usize> Stokes<D> {
         }
     }
 
-    /// Whether only rounding keeps the residual from falling further: beside solids that leave slivers of
-    /// cells, rounding errors of large pressures are larger than elsewhere.
+    /// Subtracts what the equations leave undetermined. Beside a void the surface of the material determines
+    /// the pressure.
+    pub(super) fn remove_null_space(&self, flow: &mut Flow<D>) {
+        if !self.void {
+            self.constraints.remove_null_space(&self.mesh, flow);
+        }
+    }
+
+    /// Whether only rounding keeps the residual from falling further: beside solids and voids that leave
+    /// slivers of cells, rounding errors of large pressures are larger than elsewhere.
     fn is_rounding(&self, report: &Report, stopping: &Stopping) -> bool {
-        self.mesh.parts().is_some()
+        (self.mesh.parts().is_some() || self.void)
             && report.residual <= ROUNDING.max(stopping.tolerance)
             && report.divergence <= stopping.tolerance
             && report.power_error() <= POWER_TOLERANCE

@@ -57,12 +57,20 @@ pub struct Refill {
     pub volume: f64,
 }
 
+/// What fills cells without particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Surrounding {
+    /// The background material, if there is one: no cell stays empty.
+    Material(Option<u8>),
+    /// Nothing: cells may be empty.
+    Void,
+}
+
 /// Resampling that keeps the number of particles per cell within bounds.
 #[derive(Clone, Debug)]
 pub struct Population {
     seeding: Seeding,
-    /// The background material, which fills cells without particles.
-    background: Option<u8>,
+    around: Surrounding,
     neighbours: Neighbours,
     room: Room,
     /// Volumes that the last call of [`Population::control`] has moved between cells.
@@ -93,15 +101,10 @@ struct Room {
 
 impl Population {
     /// Population control for a mesh; `seeding` gives the nominal number of particles per cell.
-    pub fn new(
-        mesh: &Mesh,
-        enclosure: &Enclosure,
-        seeding: Seeding,
-        background: Option<u8>,
-    ) -> Self {
+    pub fn new(mesh: &Mesh, enclosure: &Enclosure, seeding: Seeding, around: Surrounding) -> Self {
         let room = Room { lacking: vec![false; mesh.cells()], ..Room::default() };
         let neighbours = Neighbours::new(mesh, enclosure);
-        Population { seeding, background, neighbours, room, refills: vec![] }
+        Population { seeding, around, neighbours, room, refills: vec![] }
     }
 
     /// Restores the bounds and counts the events. `particles` must be sorted, and are sorted on
@@ -159,11 +162,12 @@ impl Population {
     /// Refills empty cells that have a neighbour with particles; returns whether there were any.
     /// Cells whose neighbours are all empty are refilled in later calls.
     fn heal_all(&mut self, mesh: &Mesh, particles: &mut Particles, count: &mut Count) -> bool {
+        let Surrounding::Material(background) = self.around else { return false };
         let before = particles.len();
         for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
             if particles.of_cell(cell).is_empty() {
                 let Some(refill) = self.heal(mesh, particles, cell) else { continue };
-                count.healed += u64::from(Some(refill.material) != self.background);
+                count.healed += u64::from(Some(refill.material) != background);
                 self.refills.push(refill);
             }
         }
@@ -181,6 +185,11 @@ impl Population {
 
     /// Particles that a cell needs.
     fn need(&self, mesh: &Mesh, particles: &Particles, cell: usize) -> Need {
+        let is_empty = |c: usize| particles.of_cell(c).is_empty() && !mesh.solid[c];
+        if self.around == Surrounding::Void && mesh.block(cell).any(is_empty) {
+            // At the surface, the number of particles follows from what they fill.
+            return Need { least: 0, quadrants: false };
+        }
         if let Some(part) = mesh.part(cell) {
             let least = (part.fraction * self.target() as f64 / 2.0).ceil() as usize;
             return Need { least, quadrants: false };

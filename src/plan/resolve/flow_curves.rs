@@ -38,7 +38,8 @@ pub(super) struct Generalised {
 impl Surroundings {
     pub(super) fn new(scene: &Scene, scope: &Scope, gravity: [f64; 2]) -> Result<Self> {
         let domain = ranges(&scene.domain.x, &scene.domain.y, scope)?;
-        let background = scene.materials.values().find(|m| m.background);
+        let around = scene.materials.values().find(|m| m.background);
+        let background = around.filter(|_| scene.background.is_none());
         let background = match background.and_then(|m| m.shear_viscosity.as_ref()) {
             Some(q) => q.compile(scope)?.constant().filter(|&v| v > 0.0),
             None => None,

@@ -3,6 +3,7 @@
 use super::flow_curves::{self, Generalised, Surroundings, generalised};
 use super::rotation::{micro_inertia, rotation};
 use super::values::{Result, finite_range, not_negative, positive, ranges};
+use super::void;
 use crate::laws::cosserat::Cosserat;
 use crate::laws::flow_curve::FlowCurve;
 use crate::laws::{Law, Shear, granular};
@@ -75,6 +76,7 @@ impl SiMatter {
             }
         }
         SceneError::join(errors)?;
+        void::empty(scene, &mut materials);
         let backgrounds: Vec<_> =
             materials.iter().filter(|m| m.background).map(|m| m.name.as_str()).collect();
         if backgrounds.len() > 1 {

@@ -26,6 +26,7 @@ pub(super) mod slip;
 mod sources;
 mod time;
 pub(super) mod values;
+mod void;
 pub(super) mod walls;
 
 pub(super) use posed::posed;
@@ -43,6 +44,7 @@ use walls::{SiBlock, Walls};
 /// Resolves a scene as if its schedule were empty. `poses`: where the blocks are that move, if not at
 /// their start.
 fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
+    let scene = &void::with_void(scene)?;
     if !is_folder_name(&scene.name) {
         return Err(SceneError::of_key(
             "name",
@@ -129,6 +131,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
         gravity: si.gravity != [0.0; 2] && has_density,
         flow_curves: si.materials.iter().any(|m| m.curve.is_some()),
         inertia: scene.inertia && has_density,
+        void: scene.background.is_some(),
         micro_inertia: si.materials.iter().any(|m| m.micro_inertia > 0.0),
     };
     if !effects.rotation {
@@ -145,7 +148,7 @@ fn without_schedule(scene: &Scene, poses: Option<&[Pose]>) -> Result<Plan> {
         warnings.push(Warning::Inertia { reynolds });
     }
     if effects.gravity {
-        warnings.extend(thin_fluid(&si.materials));
+        warnings.extend(thin_fluid(&si.materials).filter(|_| !effects.void));
         warnings.extend(drafts::drafts(scene, &si, domain, &boundary));
     }
     let body_force = scene

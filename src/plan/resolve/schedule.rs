@@ -11,7 +11,7 @@ use crate::space::mesh::{Axis, Mesh};
 /// Checks a scene and makes its plan.
 pub fn resolve(scene: &Scene) -> Result<Plan> {
     let mut plan = super::without_schedule(scene, None)?;
-    let mut current = scene.clone();
+    let mut current = super::void::with_void(scene)?;
     current.schedule.clear();
     for (index, change) in scene.schedule.iter().enumerate() {
         apply(&mut current, change, index)?;

@@ -11,8 +11,12 @@
 //! The discontinuous linear pressure is eliminated cell by cell; see
 //! [`stokes`](crate::solve::stokes). In a cell with a solid of any shape only the constant is unknown;
 //! see [`embedding`](crate::space::embedding). Its free part shrinks by what moving solids take from it.
+//! In a cell with a void in it the pressure is that of the [filled part](crate::solve::filled).
 
 use crate::solve::element::{Matrix, Nodal};
+use crate::solve::filled::Filled;
+use crate::solve::quadrature::Quadrature;
+use crate::space::measure::CellMeasure;
 use crate::space::mesh::Mesh;
 use crate::space::parts::Part;
 use crate::space::shape::{
@@ -27,6 +31,8 @@ pub struct Divergence<'a> {
     y_scale: f64,
     /// The part of the cell that solids leave free.
     part: Option<&'a Part>,
+    /// The part of the cell that the material fills, if there is a void in it.
+    filled: Option<&'a Filled>,
     /// The matrix of a cell around an axis, by pressure and component, without the factors.
     ring: Option<[[[f64; NODES]; 2]; 3]>,
 }
@@ -83,12 +89,13 @@ fn tilted(tilt: f64) -> [[[f64; NODES]; 2]; 3] {
 }
 
 impl<'a> Divergence<'a> {
-    /// Divergence matrix of a cell of a mesh.
-    pub fn new(mesh: &'a Mesh, cell: usize) -> Self {
+    /// Divergence matrix of a cell of a mesh with the contents of `quadrature`.
+    pub fn new(mesh: &'a Mesh, quadrature: &'a Quadrature, cell: usize) -> Self {
         let measure = mesh.cell_measure(cell);
         let [x_scale, y_scale] = measure.divergence_scales();
         let ring = measure.is_ring().then(|| tilted(measure.tilt()));
-        Divergence { x_scale, y_scale, part: mesh.part(cell), ring }
+        let (part, filled) = (mesh.part(cell), quadrature.filled(cell));
+        Divergence { x_scale, y_scale, part, filled, ring }
     }
 
     /// Whether each coefficient of the pressure is an unknown.
@@ -96,8 +103,40 @@ impl<'a> Divergence<'a> {
         [true, self.part.is_none(), self.part.is_none()]
     }
 
+    /// Whether there is a void in the cell.
+    pub fn is_of_filled_part(&self) -> bool {
+        self.filled.is_some()
+    }
+
+    /// Integrals of the squares of the functions of the pressure basis, `measure` that of the cell.
+    pub fn mass(&self, measure: CellMeasure) -> [f64; 3] {
+        self.filled.map_or_else(|| measure.pressure_mass(), |filled| filled.mass)
+    }
+
+    /// Coefficients in the basis of the cell, from those of `1, xi, eta`.
+    pub fn coefficients(&self, p: [f64; 3]) -> [f64; 3] {
+        self.filled.map_or(p, |filled| filled.coefficients(p))
+    }
+
+    /// Coefficients of `1, xi, eta`, from those in the basis of the cell.
+    pub fn monomials(&self, p: [f64; 3]) -> [f64; 3] {
+        self.filled.map_or(p, |filled| filled.monomials(p))
+    }
+
+    /// The rows of a part of the cell, if it has some of its own.
+    fn rows(&self) -> Option<&'a [[[f64; NODES]; 2]; 3]> {
+        let of_part = self.part.map(|part| &part.divergence);
+        of_part.or_else(|| self.filled.map(|filled| &filled.divergence))
+    }
+
     /// `B u` for the unknown pressures.
     pub fn apply<const D: usize>(&self, u: &Nodal<D>) -> [f64; 3] {
+        if let Some(filled) = self.filled {
+            return filled
+                .divergence
+                .each_ref()
+                .map(|[x, y]| (0..NODES).map(|a| x[a] * u[a][0] + y[a] * u[a][1]).sum::<f64>());
+        }
         if let Some(part) = self.part {
             let [x, y] = &part.divergence[0];
             return [(0..NODES).map(|a| x[a] * u[a][0] + y[a] * u[a][1]).sum(), 0.0, 0.0];
@@ -136,8 +175,8 @@ impl<'a> Divergence<'a> {
 
     /// `f += B^T p`.
     pub fn add_transposed<const D: usize>(&self, p: &[f64; 3], f: &mut Nodal<D>) {
-        if let Some(part) = self.part {
-            for ([x, y], p) in part.divergence.iter().zip(p) {
+        if let Some(rows) = self.rows() {
+            for ([x, y], p) in rows.iter().zip(p) {
                 for a in 0..NODES {
                     f[a][0] += x[a] * p;
                     f[a][1] += y[a] * p;
@@ -169,8 +208,8 @@ impl<'a> Divergence<'a> {
             let scaled = |x: &[f64; NODES], y: &[f64; NODES]| {
                 [x.map(|v| v * self.x_scale), y.map(|v| v * self.y_scale)]
             };
-            let [bx, by] = match (self.part, &self.ring) {
-                (Some(part), _) => part.divergence[q],
+            let [bx, by] = match (self.rows(), &self.ring) {
+                (Some(rows), _) => rows[q],
                 (None, Some(ring)) => scaled(&ring[q][0], &ring[q][1]),
                 (None, None) => scaled(&x[q], &y[q]),
             };
