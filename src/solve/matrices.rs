@@ -160,6 +160,11 @@ impl<const D: usize> Matrices<D> {
         outlines.cells().iter().for_each(|&cell| self.built_from[cell] = Content::Unknown);
         for (cell, built_from) in self.built_from.iter_mut().enumerate() {
             let content = from.quadrature.content(cell);
+            if content == Content::Empty && *built_from != Content::Empty {
+                *built_from = content;
+                self.blocks[cell] = Self::NO_BLOCKS;
+                changed(cell);
+            }
             // The penalty of a cell with a solid in it depends on its neighbours.
             let alone = from.mesh.part(cell).is_none() && !from.loose.contains(cell);
             let known = content.is_constant() && content == *built_from && alone;

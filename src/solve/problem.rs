@@ -45,6 +45,9 @@ pub struct Stokes<const D: usize> {
     pub(super) loose: Loose,
     /// Whether a void is around the materials; its cells are solid in the mesh of the problem.
     pub(super) void: bool,
+    /// Cells of the elimination beside a void: those of the problem and some around them, whose matrices are
+    /// zero.
+    pub(super) eliminated: Vec<bool>,
 }
 
 /// Loads that drive a solution.

@@ -29,6 +29,7 @@
 
 use super::loose::{Course, Loose};
 use super::matrices::{Ingredients, Matrices};
+use super::multifrontal::tree::Tree;
 use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
 use super::problem::{Given, NODE_GRAIN, Residual, Work};
 pub use super::problem::{Loads, Stokes};
@@ -40,6 +41,7 @@ use super::terms::{FaceTerm, Terms};
 use crate::simd::Simd;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
+use crate::space::incidence::Incidence;
 use crate::space::mesh::Mesh;
 use crate::space::parts::Parts;
 use crate::space::shape::SIDE_NODES;
@@ -80,6 +82,7 @@ impl<const D: usize> Stokes<D> {
             work: Work::default(),
             loose: Loose::default(),
             void: false,
+            eliminated: vec![],
             mesh,
             constraints,
         }
@@ -100,9 +103,19 @@ impl<const D: usize> Stokes<D> {
         }
         let mut occupied = mesh.clone();
         occupied.solid.iter_mut().enumerate().for_each(|(cell, out)| *out = left_out(cell));
-        let Symbolic { tree, incidence } = Symbolic::new(&occupied);
-        self.factor = Multifrontal::new(tree, mesh.cells());
-        self.incidence = incidence;
+        self.incidence = Arc::new(Incidence::new(&occupied));
+        let eliminates = |cell: usize| self.eliminated.get(cell).is_none_or(|&is| is);
+        let all_eliminated = (0..mesh.cells()).all(|c| occupied.solid[c] || eliminates(c));
+        if self.eliminated.is_empty() || !all_eliminated {
+            // The elimination includes the cells around, so that it serves for the next steps too.
+            let near =
+                |cell: usize| !mesh.solid[cell] && mesh.block(cell).any(|c| !occupied.solid[c]);
+            self.eliminated = (0..mesh.cells()).map(near).collect();
+            let mut region = mesh.clone();
+            let out = region.solid.iter_mut().zip(&self.eliminated);
+            out.for_each(|(out, eliminated)| *out = !eliminated);
+            self.factor = Multifrontal::new(Arc::new(Tree::new(&region)), mesh.cells());
+        }
         self.mesh = Arc::new(occupied);
         // Vectors keep what they have for cells that are left out.
         self.work = Work::default();
