@@ -43,7 +43,9 @@ impl Plan {
     /// Whether the pressure is given at a point, and the reason.
     pub(super) fn zero_of_pressure(&self) -> (bool, String) {
         let Some(point) = &self.pressure_reference else {
-            let reason = if self.boundary.closed {
+            let reason = if self.effects.void {
+                "the surface of the materials determines the pressure: nothing is around them"
+            } else if self.boundary.closed {
                 "closed domain without friction: the mean of the pressure is zero"
             } else {
                 "the boundaries determine the pressure"

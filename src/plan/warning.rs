@@ -84,6 +84,13 @@ pub enum Warning {
         /// Size of the cells there, m.
         cell: f64,
     },
+    /// A void is enclosed by material, where a background would keep its volume.
+    TrappedVoid {
+        /// A place in it, m.
+        at: [f64; 2],
+        /// When it was found first, s.
+        time: f64,
+    },
     /// Cells beside solids did not keep their volume.
     LooseCells {
         /// Number of solutions with such cells.
@@ -179,6 +186,11 @@ impl fmt::Display for Warning {
                 "the gap between `{a}` and `{b}` near ({x:.4}, {y:.4}) is {width:.3e} m wide, {:.1} of a cell: \
                  the flow through it is uncertain, or it is closed; raise accuracy.cells, or make them touch",
                 width / cell,
+            ),
+            Warning::TrappedVoid { at: [x, y], time } => write!(
+                f,
+                "material encloses a void near ({x:.4}, {y:.4}) m at t = {time:.4e} s: it can collapse, where air \
+                 would keep its volume; give a material `background = true` if the air matters"
             ),
             Warning::LooseCells { solutions, cells } => write!(
                 f,

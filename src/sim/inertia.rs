@@ -20,6 +20,7 @@ use crate::motion::frozen_flow::{CellVelocities, Displacement, FrozenFlow};
 use crate::plan::Plan;
 use crate::plan::material::Material;
 use crate::solve::density::Density;
+use crate::solve::points::VOID_MASS;
 use crate::solve::quadrature::Quadrature;
 use crate::solve::terms::inertia::{Inertia as Term, Mass};
 use crate::space::flow::{Flow, gradient, interpolate};
@@ -281,7 +282,7 @@ impl Course<'_> {
         let Course { mesh, last: (last, last_flow), before, rates: [_, a1, a2], unit } = self;
         threads::for_each(cells, GRAIN, |cell, out| {
             *out = Cell::EMPTY;
-            if mesh.solid[cell] {
+            if mesh.solid[cell] || density.is_void(cell) {
                 return;
             }
             let volume = mesh.cell_volume(cell);
@@ -293,6 +294,10 @@ impl Course<'_> {
             let mut origins = from.map(|at| (cell, at));
             last_flow.travel_all(cell, &from[..count], |q, way| origins[q] = end(mesh, &way));
             let mut origins = origins.into_iter();
+            // In a cell that material fills in part, all of it has a little mass.
+            let void = density.void_share(cell);
+            let even = if void > 0.0 { VOID_MASS * void / (1.0 - void) } else { 0.0 };
+            let mean = if void > 0.0 { density.mean(cell) } else { 0.0 };
             density.for_fine_points(cell, |point| {
                 let Some(mut one) = origins.next() else { return };
                 if last.parts > 1 {
@@ -308,7 +313,10 @@ impl Course<'_> {
                     let u = interpolated(mesh, values, two);
                     (0..C).for_each(|c| carried[c] -= a2 * u[c]);
                 }
-                let mass = unit * volume * point.mass;
+                let mut mass = unit * volume * point.mass;
+                if void > 0.0 {
+                    mass += unit * volume * even * mean / count as f64;
+                }
                 for a in 0..NODES {
                     let share = mass * point.n[a];
                     (0..C).for_each(|c| out.load[a][c] += share * carried[c] / last.dt);

@@ -120,6 +120,9 @@ impl<const D: usize> Run for Simulation<D> {
         if solutions > 0 && self.step > 0 {
             list.push(Warning::LooseCells { solutions, cells });
         }
+        if let Some([x, y, time]) = self.trapped_void {
+            list.push(Warning::TrappedVoid { at: [x, y], time });
+        }
         let [ill_posed, flowed] = self.flowed;
         if ill_posed > ILL_POSED * flowed {
             list.push(Warning::IllPosed { share: ill_posed / flowed });

@@ -233,6 +233,9 @@ impl<const D: usize> Simulation<D> {
         if self.loosened[0] > 0 {
             s.put_counts("loosened", self.loosened);
         }
+        if let Some(trapped) = self.trapped_void {
+            s.put_floats("trapped_void", trapped);
+        }
         s.put_floats("baseline", self.baseline.iter().copied());
         s.put_floats("other_power", [self.last_other_power]);
         save_row(&self.row, s);
@@ -333,6 +336,10 @@ impl<const D: usize> Simulation<D> {
             None => [0.0; 2],
         };
         let loosened = s.tally("loosened").unwrap_or_default();
+        let trapped_void = match s.try_floats("trapped_void") {
+            Some(_) => Some(s.numbers("trapped_void")?),
+            None => None,
+        };
         let tolerated = s.floats("tolerated")?.first().copied();
         let baseline = s.exactly("baseline", materials)?;
         let [last_other_power] = s.numbers("other_power")?;
@@ -367,6 +374,7 @@ impl<const D: usize> Simulation<D> {
         self.first_energy = first_energy;
         self.flowed = flowed;
         self.loosened = loosened;
+        self.trapped_void = trapped_void;
         self.recent_energy = recent_energy;
         let entering = self.inflow.iter().flat_map(|i| i.cells_of_interest(plan.background()));
         self.interest.update(mesh, self.quadrature.composition(), plan.background(), entering);

@@ -103,6 +103,8 @@ pub struct Simulation<const D: usize> {
     /// Number of solutions with cells that did not keep their volume, and the largest number of such
     /// cells.
     pub(super) loosened: [u64; 2],
+    /// Place (m) and time (s) at which material enclosed a void first.
+    pub(super) trapped_void: Option<[f64; 3]>,
     /// Potential energy at the start, J/m.
     pub(super) first_energy: f64,
     /// What has crossed the sides and is not yet counted.
@@ -197,6 +199,7 @@ impl<const D: usize> Simulation<D> {
             last_other_power: 0.0,
             flowed: [0.0; 2],
             loosened: [0; 2],
+            trapped_void: None,
             first_energy: 0.0,
             crossings: Vec::new(),
             recent_energy: [0.0; 2],

@@ -241,7 +241,8 @@ impl<const D: usize> Simulation<D> {
                 let value = |k: usize| {
                     let (x, y) = (&columns[k % raster.n[0]], &rows[k / raster.n[0]]);
                     let cell = mesh.cell(x.cell, y.cell);
-                    if mesh.is_solid_in(cell, raster.centre(k)) {
+                    let nothing = self.is_void_at(cell, [x.r, y.r]);
+                    if nothing || mesh.is_solid_in(cell, raster.centre(k)) {
                         return f32::NAN;
                     }
                     let nodes = mesh.cell_nodes(cell);
@@ -297,7 +298,8 @@ impl<const D: usize> Simulation<D> {
         threads::for_each(&mut values, SAMPLE_GRAIN, |k, v| {
             let (x, y) = (&columns[k % raster.n[0]], &rows[k / raster.n[0]]);
             let cell = mesh.cell(x.cell, y.cell);
-            let local = if mesh.is_solid_in(cell, raster.centre(k)) {
+            let nothing = self.is_void_at(cell, [x.r, y.r]);
+            let local = if nothing || mesh.is_solid_in(cell, raster.centre(k)) {
                 None
             } else {
                 self.local_at(cell, [x.r, y.r])
@@ -339,7 +341,11 @@ impl<const D: usize> Simulation<D> {
         let plan = &self.plan;
         let raster = Raster::new(plan, ARROWS);
         let mesh = &plan.mesh;
-        let fluid = |k: &usize| !mesh.is_solid_at(raster.centre(*k));
+        let fluid = |k: &usize| {
+            let at = raster.centre(*k);
+            let cell = mesh.locate(at);
+            !mesh.is_solid_at(at) && !self.is_void_at(cell, mesh.to_reference(cell, at))
+        };
         let points: Vec<usize> = (0..raster.len()).filter(fluid).collect();
         let velocities: Vec<[f64; 2]> = points
             .iter()

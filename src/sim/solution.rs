@@ -87,7 +87,9 @@ impl<const D: usize> Simulation<D> {
         // In first-order time stepping the restoring terms act on the velocity, not on its change.
         let still = self.plan.method.integrator == Integrator::Euler;
         let before = before.velocity.iter().map(|u| if still { [0.0; 2] } else { [u[0], u[1]] });
-        let viscosities = self.matter.materials.iter().map(|m| m.viscosity);
+        let solved =
+            self.matter.materials.iter().filter(|m| !(self.plan.effects.void && m.background));
+        let viscosities = solved.map(|m| m.viscosity);
         let ahead = Ahead {
             gravity: self.matter.gravity,
             time: ahead,

@@ -68,6 +68,8 @@ pub struct Density {
     densities: Vec<Option<Polynomial>>,
     /// Whether densities lie nowhere below that of the lightest material.
     bounded: bool,
+    /// Share of a void in each cell; empty without one.
+    void: Vec<f64>,
     /// What is distributed, per mass of a material: 1 for the mass itself.
     pub per_mass: fn(&Material) -> f64,
     /// Parts of cells with solids of any shape in them; their density is constant.
@@ -129,6 +131,7 @@ impl Density {
             fits: vec![Fit::default(); materials],
             densities: Vec::with_capacity(materials),
             bounded,
+            void: vec![],
             per_mass: |_| 1.0,
             parts: mesh.shared_parts(),
             measures: (0..mesh.cells()).map(|cell| mesh.whole_measure(cell)).collect(),
@@ -144,6 +147,10 @@ impl Density {
         materials: &[Material],
         quadrature: &Quadrature,
     ) {
+        if let Some(fill) = quadrature.composition().fill() {
+            self.void.clear();
+            self.void.extend((0..mesh.cells()).map(|cell| 1.0 - fill.of(cell)));
+        }
         for cell in 0..mesh.cells() {
             let kept = self.of_sides[cell].take();
             self.at_gauss[cell] = match quadrature.content(cell) {
@@ -184,6 +191,16 @@ impl Density {
 
     fn part(&self, cell: usize) -> Option<&Part> {
         self.parts.as_deref()?.of(cell)
+    }
+
+    /// Whether a cell is of a void.
+    pub fn is_void(&self, cell: usize) -> bool {
+        self.void_share(cell) == 1.0
+    }
+
+    /// Share of a void in a cell.
+    pub fn void_share(&self, cell: usize) -> f64 {
+        self.void.get(cell).copied().unwrap_or(0.0)
     }
 
     /// Mean density of the section of a cell.

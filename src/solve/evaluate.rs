@@ -185,8 +185,9 @@ impl Evaluation<'_> {
         // Where one side is void, it has a part of the viscosities of the other.
         let with_void = |laws: [PointLaw; 2]| match void {
             Some((side, _)) => {
-                let mut out = laws;
-                out[side] = laws[1 - side].scaled(VOID);
+                let (mut out, law) = (laws, laws[1 - side]);
+                let nominal = self.materials[between[1 - side]].viscosity;
+                out[side] = law.scaled(VOID * (nominal / law.shear.mean()).max(1.0));
                 out
             }
             None => laws,

@@ -259,7 +259,9 @@ impl<const D: usize> Stokes<D> {
             current = near || updates == most_updates;
             let slope = self.slope(work);
             let power = report.dissipation.max(REST * report.power_scale);
-            report.decrement = Some((slope.abs() / power).sqrt());
+            // Where nothing moves, no power tells the error.
+            let decrement = if slope == 0.0 { 0.0 } else { (slope.abs() / power).sqrt() };
+            report.decrement = Some(decrement);
             quadrature.keep_softening();
             let (share, evaluated) =
                 self.search(quadrature, matter, loads, (flow, &pressure, &mut along), work, slope);

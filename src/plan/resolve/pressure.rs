@@ -39,6 +39,10 @@ pub(super) fn reference(
         }
         return Ok(Some(PressurePoint { at, value: value / units.stress() }));
     }
+    if scene.background.is_some() {
+        // The surface of the materials determines the pressure.
+        return Ok(None);
+    }
     let grains = scene.materials.iter().find(|(_, m)| m.friction.is_some());
     let (key, what, whose) = match grains {
         _ if !boundary.closed => return Ok(None),

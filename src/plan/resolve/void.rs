@@ -55,6 +55,11 @@ fn check(scene: &Scene) -> Result<()> {
             "accuracy.quadrature".into(),
             "a quadrature other than \"sides\"",
         ),
+        (
+            scene.pressure_reference.is_some(),
+            "pressure_reference".into(),
+            "a pressure_reference: the surface of the materials determines the pressure",
+        ),
         (scene.body_force.is_some(), "body_force".into(), "a body force per volume"),
         (
             scene.materials.values().any(|m| m.bulk_viscosity.is_some()),

@@ -222,7 +222,10 @@ impl<const D: usize> Multifrontal<D> {
 
     /// Marks the matrix of a cell as changed since the last factorisation.
     pub fn touch(&mut self, cell: usize) {
-        self.stale[self.leaf_of[cell] as usize] = true;
+        // Without any cell there are no fronts.
+        if let Some(stale) = self.stale.get_mut(self.leaf_of[cell] as usize) {
+            *stale = true;
+        }
     }
 
     /// Factors the fronts above cells that changed.

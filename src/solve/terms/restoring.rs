@@ -122,9 +122,17 @@ impl Restoring {
             if jump > least {
                 let side = 2 * face.normal + 1;
                 let strength = ahead * g * jump * mesh.face(a, side).area;
-                self.faces.push(CellFace { cell: a, side });
+                // A cell of a void has no matrix.
+                let (cell, side) = if density.is_void(a) { (b, side - 1) } else { (a, side) };
+                self.faces.push(CellFace { cell, side });
                 self.strength.push(strength);
             }
+        }
+        if !self.faces.is_sorted_by_key(|face| face.cell) {
+            let mut order: Vec<usize> = (0..self.faces.len()).collect();
+            order.sort_by_key(|&k| self.faces[k].cell);
+            self.faces = order.iter().map(|&k| self.faces[k]).collect();
+            self.strength = order.iter().map(|&k| self.strength[k]).collect();
         }
         let direction = self.direction;
         self.cells.extend((0..mesh.cells()).map(|cell| {
