@@ -1,4 +1,4 @@
-//! This module names the effects that a scene may need.
+//! This module names the effects that a scene may need, and says which of them are solved.
 
 /// Effects that a scene may need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,4 +78,29 @@ impl EffectKind {
             Moving => "solids that move",
         }
     }
+}
+
+/// Effects that are solved: they decide which unknowns, particle columns and stages exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EffectSet {
+    /// The Cosserat rotation is an unknown.
+    pub rotation: bool,
+    /// Particles carry directors.
+    pub directors: bool,
+    /// Particles carry their own viscosity.
+    pub carried_viscosity: bool,
+    /// Particles carry their own density.
+    pub carried_density: bool,
+    /// Particle volumes follow the flow (finite bulk viscosity).
+    pub volume_change: bool,
+    /// Gravity acts on a material with density.
+    pub gravity: bool,
+    /// A law depends on the flow: friction, a yield stress or a power law.
+    pub flow_curves: bool,
+    /// Nothing is around the materials.
+    pub void: bool,
+    /// Inertia acts on the materials with density.
+    pub inertia: bool,
+    /// Inertia acts on the rotation too.
+    pub micro_inertia: bool,
 }

@@ -24,7 +24,7 @@ pub mod units;
 mod warning;
 
 pub use boundary::{BoundaryPlan, Conditions, Piece, Side, WallLine};
-pub use effect_kind::EffectKind;
+pub use effect_kind::{EffectKind, EffectSet};
 pub use effects::{Effect, EffectList, StepTime};
 pub use forces::ForceGauge;
 pub use moving::{Moving, Pose};
@@ -141,31 +141,6 @@ pub enum When {
     Time(f64),
     /// With the solution of this step.
     Step(u64),
-}
-
-/// Effects that are solved: they decide which unknowns, particle columns and stages exist.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EffectSet {
-    /// The Cosserat rotation is an unknown.
-    pub rotation: bool,
-    /// Particles carry directors.
-    pub directors: bool,
-    /// Particles carry their own viscosity.
-    pub carried_viscosity: bool,
-    /// Particles carry their own density.
-    pub carried_density: bool,
-    /// Particle volumes follow the flow (finite bulk viscosity).
-    pub volume_change: bool,
-    /// Gravity acts on a material with density.
-    pub gravity: bool,
-    /// A law depends on the flow: friction, a yield stress or a power law.
-    pub flow_curves: bool,
-    /// Nothing is around the materials.
-    pub void: bool,
-    /// Inertia acts on the materials with density.
-    pub inertia: bool,
-    /// Inertia acts on the rotation too.
-    pub micro_inertia: bool,
 }
 
 /// A part of the domain (SI coordinates) and the material that fills it at the start.

@@ -382,7 +382,9 @@ impl<const D: usize> Simulation<D> {
         self.last_other_power = last_other_power;
         self.row = row;
         self.events.clear();
-        Ok(())
+        // The next step moves particles with the velocities of the cells that were solved for.
+        let failed = |e: SimError| StateError::Range { name: "particles", value: e.to_string() };
+        self.leave_out_void().map_err(failed)
     }
 }
 

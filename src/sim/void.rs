@@ -90,7 +90,8 @@ fn trapped(plan: &Plan, fill: &Fill) -> Option<usize> {
     };
     let mut reaches_open = vec![false; mesh.cells()];
     (0..4).flat_map(open_at).for_each(|cell| reaches_open[cell] = true);
-    let has_void = |cell: usize| !mesh.solid[cell] && fill.of(cell) < 1.0;
+    // Cells that are mostly filled do not join voids.
+    let has_void = |cell: usize| !mesh.solid[cell] && fill.of(cell) < 0.5;
     let mut seen = vec![false; mesh.cells()];
     let (mut members, mut enclosed) = (vec![], vec![]);
     let mut voids = 0;

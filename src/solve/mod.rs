@@ -15,6 +15,7 @@ mod loose;
 pub mod matrices;
 pub mod multifrontal;
 pub mod nonlinear;
+mod occupied;
 mod particle_points;
 pub mod points;
 mod problem;

@@ -22,7 +22,6 @@
 //! to its volume: the method of the source paper, for comparison.
 
 use super::cells::CellsMut;
-use super::filled::Filled;
 use super::last_flow::LastFlow;
 use super::local_laws::Evaluation;
 use super::points::{CutStiffness, INSIDE_SOLIDS, IntegrationPoint};
@@ -223,11 +222,6 @@ impl Quadrature {
             let [before, after] = [&self.softening_before, &self.softening].map(|s| &s[cell]);
             softening::advance(before, after, share, directions);
         });
-    }
-
-    /// Divergence of the filled part of a cell with a void in it.
-    pub fn filled(&self, cell: usize) -> Option<&Filled> {
-        self.cut(cell)?.filled.as_ref()
     }
 
     /// Kink of the velocity in a cell, if it has one.

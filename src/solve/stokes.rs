@@ -29,7 +29,6 @@
 
 use super::loose::{Course, Loose};
 use super::matrices::{Ingredients, Matrices};
-use super::multifrontal::tree::Tree;
 use super::multifrontal::{Effort, Multifrontal, NotPositiveDefinite};
 use super::problem::{Given, NODE_GRAIN, Residual, Work};
 pub use super::problem::{Loads, Stokes};
@@ -41,7 +40,6 @@ use super::terms::{FaceTerm, Terms};
 use crate::simd::Simd;
 use crate::space::constraints::Constraints;
 use crate::space::flow::Flow;
-use crate::space::incidence::Incidence;
 use crate::space::mesh::Mesh;
 use crate::space::parts::Parts;
 use crate::space::shape::SIDE_NODES;
@@ -93,49 +91,6 @@ impl<const D: usize> Stokes<D> {
         self.constraints = constraints;
     }
 
-    /// Leaves the cells that `is_empty` out of the problem: their nodes have no unknowns unless another cell
-    /// has them too.
-    pub fn leave_out(&mut self, mesh: &Mesh, is_empty: impl Fn(usize) -> bool) {
-        let left_out = |cell: usize| mesh.solid[cell] || is_empty(cell);
-        self.void = true;
-        if (0..mesh.cells()).all(|cell| self.mesh.solid[cell] == left_out(cell)) {
-            return;
-        }
-        let mut occupied = mesh.clone();
-        occupied.solid.iter_mut().enumerate().for_each(|(cell, out)| *out = left_out(cell));
-        self.incidence = Arc::new(Incidence::new(&occupied));
-        let eliminates = |cell: usize| self.eliminated.get(cell).is_none_or(|&is| is);
-        let all_eliminated = (0..mesh.cells()).all(|c| occupied.solid[c] || eliminates(c));
-        if self.eliminated.is_empty() || !all_eliminated {
-            // The elimination includes the cells around, so that it serves for the next steps too.
-            let near =
-                |cell: usize| !mesh.solid[cell] && mesh.block(cell).any(|c| !occupied.solid[c]);
-            self.eliminated = (0..mesh.cells()).map(near).collect();
-            let mut region = mesh.clone();
-            let out = region.solid.iter_mut().zip(&self.eliminated);
-            out.for_each(|(out, eliminated)| *out = !eliminated);
-            self.factor = Multifrontal::new(Arc::new(Tree::new(&region)), mesh.cells());
-        }
-        self.mesh = Arc::new(occupied);
-        // Vectors keep what they have for cells that are left out.
-        self.work = Work::default();
-    }
-
-    /// The mesh of the problem, in which cells without material are solid.
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
-    /// Whether all cells of a node are left out.
-    pub fn is_left_out(&self, node: usize) -> bool {
-        self.incidence.of_node(node).next().is_none()
-    }
-
-    /// Sets the prescribed components to their values.
-    pub fn impose(&self, velocity: &mut [[f64; D]]) {
-        self.constraints.impose(velocity);
-    }
-
     /// Whether a velocity other than zero is prescribed.
     pub fn is_driven(&self) -> bool {
         self.constraints.is_driven()
@@ -143,6 +98,9 @@ impl<const D: usize> Stokes<D> {
 
     /// Number of velocity and rotation unknowns, including condensed ones.
     pub fn unknowns(&self) -> usize {
+        if self.void {
+            return (0..self.mesh.nodes()).filter(|&node| !self.is_left_out(node)).count() * D;
+        }
         self.mesh.nodes() * D
     }
     /// Work of the last factorisation.
@@ -342,14 +300,6 @@ impl<const D: usize> Stokes<D> {
                 self.loose.add_largest(&self.mesh, &residual.divergence)
             }
             _ => false,
-        }
-    }
-
-    /// Subtracts what the equations leave undetermined. Beside a void the surface of the material determines
-    /// the pressure.
-    pub(super) fn remove_null_space(&self, flow: &mut Flow<D>) {
-        if !self.void {
-            self.constraints.remove_null_space(&self.mesh, flow);
         }
     }
 

@@ -103,6 +103,7 @@ fn tilts(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
     }
     out.tables.push(table);
     compare_rules(cells, out)?;
+    void(cells, out)?;
     out.check("tilted surfaces, 8 cells: error of the power", largest[0][0], Bound::AtMost(0.07));
     out.check("tilted surfaces, 16 cells: error of the power", largest[1][0], Bound::AtMost(0.025));
     out.check(
@@ -167,6 +168,41 @@ fn compare_rules(cells: &[u32], out: &mut Section) -> Result<(), CaseError> {
     }
     out.tables.push(table);
     out.figures.push(figure);
+    Ok(())
+}
+
+/// Errors of the power with a void instead of the light fluid, which is that of the largest contrast.
+fn void(cells: &[u32], out: &mut Section) -> Result<(), CaseError> {
+    let title = "Relative error of the power with `background = \"void\"` (in brackets: fastest node over \
+                 the fastest light fluid)";
+    let mut header = vec!["slope".to_string()];
+    header.extend(cells.iter().map(|cells| format!("{cells} cells")));
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let mut table = Table::new(title, &header);
+    let mut largest = vec![0.0_f64; cells.len()];
+    for tilt in TILTS.iter().filter(|tilt| tilt.contrast == 1e8) {
+        let mut row = vec![number(tilt.slope)];
+        for (&cells, largest) in cells.iter().zip(&mut largest) {
+            let source = tilted(tilt, cells, RULE, -1.0)?.with_sets(&["background=void".into()])?;
+            let text = source.text().replace("[[regions]]\nmaterial = \"light\"\n", "");
+            let run = start(&SceneSource::new("tilt", text))?;
+            let error = run.row().power_in / tilt.exact.power - 1.0;
+            *largest = largest.max(error.abs());
+            row.push(format!(
+                "{} ({:.1})",
+                number(error),
+                run.row().max_speed / tilt.exact.fastest
+            ));
+        }
+        table.rows.push(row);
+    }
+    out.tables.push(table);
+    for (&cells, (largest, bound)) in
+        cells.iter().zip(largest.into_iter().zip([0.06, 0.025, 0.012, 0.006]))
+    {
+        let what = format!("void, {cells} cells: error of the power");
+        out.check(what, largest, Bound::AtMost(bound));
+    }
     Ok(())
 }
 

@@ -20,6 +20,7 @@ mod solids;
 mod sources;
 mod steps;
 mod verification;
+mod void;
 
 use grainscope::plan::resolve;
 use grainscope::scene::{SceneSource, parse};

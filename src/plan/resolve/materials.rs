@@ -3,7 +3,6 @@
 use super::flow_curves::{self, Generalised, Surroundings, generalised};
 use super::rotation::{micro_inertia, rotation};
 use super::values::{Result, finite_range, not_negative, positive, ranges};
-use super::void;
 use crate::laws::cosserat::Cosserat;
 use crate::laws::flow_curve::FlowCurve;
 use crate::laws::{Law, Shear, granular};
@@ -76,7 +75,9 @@ impl SiMatter {
             }
         }
         SceneError::join(errors)?;
-        void::empty(scene, &mut materials);
+        if scene.background.is_some() {
+            empty(&mut materials);
+        }
         let backgrounds: Vec<_> =
             materials.iter().filter(|m| m.background).map(|m| m.name.as_str()).collect();
         if backgrounds.len() > 1 {
@@ -269,6 +270,28 @@ impl SiMaterial {
             ));
         }
         Ok(out)
+    }
+}
+
+/// Gives the material that stands for a void the properties of nothing; its viscosity, which nothing uses, is
+/// the largest of the others.
+fn empty(materials: &mut [SiMaterial]) {
+    let others = materials.iter().filter(|m| !m.background).map(|m| m.viscosity);
+    let viscosity = others.fold(0.0, f64::max);
+    for m in materials.iter_mut().filter(|m| m.background) {
+        *m = SiMaterial {
+            name: std::mem::take(&mut m.name),
+            viscosity: if viscosity > 0.0 { viscosity } else { 1.0 },
+            viscosity_field: None,
+            density: 0.0,
+            density_field: None,
+            compliance: 0.0,
+            rotation: None,
+            micro_inertia: 0.0,
+            layer_viscosity: None,
+            curve: None,
+            background: true,
+        };
     }
 }
 

@@ -3,12 +3,9 @@
 //! The void is a material without particles. It takes the place of the material with
 //! `background = true`, if the scene has one.
 
-use super::materials::SiMaterial;
 use super::values::Result;
 use crate::plan::MAX_MATERIALS;
-use crate::scene::{
-    Background, Field, Geometry, Material, Quadrature, Quantity, Scene, SceneError,
-};
+use crate::scene::{Field, Geometry, Material, Quadrature, Quantity, Scene, SceneError};
 
 /// Name of the void where no material has `background = true`.
 const NAME: &str = "void";
@@ -95,31 +92,6 @@ fn check(scene: &Scene) -> Result<()> {
             "remove `background = \"void\"` and give a material `background = true`, or remove this",
         )),
         None => Ok(()),
-    }
-}
-
-/// Gives the void the properties of nothing; its viscosity, which nothing uses, is the largest of the
-/// others.
-pub(super) fn empty(scene: &Scene, materials: &mut [SiMaterial]) {
-    if scene.background != Some(Background::Void) {
-        return;
-    }
-    let others = materials.iter().filter(|m| !m.background).map(|m| m.viscosity);
-    let viscosity = others.fold(0.0, f64::max);
-    for m in materials.iter_mut().filter(|m| m.background) {
-        *m = SiMaterial {
-            name: m.name.clone(),
-            viscosity: if viscosity > 0.0 { viscosity } else { 1.0 },
-            viscosity_field: None,
-            density: 0.0,
-            density_field: None,
-            compliance: 0.0,
-            rotation: None,
-            micro_inertia: 0.0,
-            layer_viscosity: None,
-            curve: None,
-            background: true,
-        };
     }
 }
 

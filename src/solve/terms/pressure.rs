@@ -94,7 +94,8 @@ impl<'a> Divergence<'a> {
         let measure = mesh.cell_measure(cell);
         let [x_scale, y_scale] = measure.divergence_scales();
         let ring = measure.is_ring().then(|| tilted(measure.tilt()));
-        let (part, filled) = (mesh.part(cell), quadrature.filled(cell));
+        let part = mesh.part(cell);
+        let filled = quadrature.cut(cell).and_then(|cut| cut.filled.as_ref());
         Divergence { x_scale, y_scale, part, filled, ring }
     }
 
