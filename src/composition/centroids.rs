@@ -24,6 +24,7 @@
 //! has the volume and the centroid of the particles; its area and centroid in the plane of the mesh are
 //! those that lines are found from.
 
+use super::surface::VoidPart;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 
@@ -70,15 +71,18 @@ impl Centroids {
         }
     }
 
-    /// Adds the material `m` that stands for a void, with its share of the cell: what the materials, whose
-    /// volumes are multiplied by `factors`, leave free of it.
-    pub fn add_void(&mut self, (m, share): (usize, f64), factors: &[f64]) {
+    /// Adds a void: what the materials, whose volumes are multiplied by `factors`, leave free of the cell.
+    pub fn add_void(&mut self, void: VoidPart, factors: &[f64]) {
         let (mut volume, mut moment) = (0.0, [0.0; 2]);
         for (part, factor) in self.parts.iter().zip(factors) {
             volume += part.volume * factor;
             (0..2).for_each(|c| moment[c] -= part.moment[c] * factor);
         }
-        self.parts[m] = Part { volume: volume * share / (1.0 - share), moment };
+        let volume = volume * void.share / (1.0 - void.share);
+        if let Some((centroid, part)) = void.around {
+            (0..2).for_each(|c| moment[c] += part * (volume * centroid[c] - moment[c]));
+        }
+        self.parts[void.material] = Part { volume, moment };
     }
 
     /// Computes the shares and the shifted centroids of the gathered particles. The volume of each

@@ -63,10 +63,9 @@ impl Fill {
         self.share[cell]
     }
 
-    /// The material that stands for the void and its share of a cell that is filled in part.
-    pub fn void_in(&self, cell: usize) -> Option<(usize, f64)> {
-        let share = self.share[cell];
-        (share > 0.0 && share < 1.0).then(|| (self.void, 1.0 - share))
+    /// Whether a material fills a cell in part.
+    pub fn is_partial(&self, cell: usize) -> bool {
+        self.share[cell] > 0.0 && self.share[cell] < 1.0
     }
 
     /// Cells of the largest body that nothing holds, if such bodies have no flow.

@@ -8,6 +8,7 @@ use super::Kind;
 use super::centroids::Centroids;
 use super::features::{self, Strip};
 use super::interface::{Interface, Surroundings};
+use super::surface::VoidPart;
 use crate::laws::director::Orientation;
 use crate::space::fit::{Degree, Fit, Polynomial};
 use crate::space::mesh::Mesh;
@@ -43,8 +44,8 @@ pub struct Gathered {
     points: [f64; 9],
     /// Particles of the cell and its neighbours.
     surroundings: Surroundings,
-    /// The material that stands for a void, and its share of the cell.
-    void: Option<(usize, f64)>,
+    /// The void of the cell.
+    void: Option<VoidPart>,
     /// Working memory.
     numbers: Vec<f64>,
 }
@@ -133,13 +134,13 @@ impl Gathered {
         }
     }
 
-    /// Adds the material `m` that stands for a void, with its share of the cell, after
-    /// [`Gathered::gather`].
-    pub fn add_void(&mut self, (m, share): (usize, f64), factors: &[f64]) {
+    /// Adds a void, after [`Gathered::gather`].
+    pub fn add_void(&mut self, void: VoidPart, factors: &[f64]) {
+        let VoidPart { material: m, share, .. } = void;
         let volume: f64 = self.volume.iter().zip(factors).map(|(v, f)| v * f).sum();
         self.volume[m] = volume * share / (1.0 - share);
         self.weight[9 * m..9 * m + 9].fill(self.volume[m]);
-        self.void = Some((m, share));
+        self.void = Some(void);
     }
 
     /// The two materials of the cell and the particles around it; `None` if the cell has more or

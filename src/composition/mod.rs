@@ -10,6 +10,7 @@ pub mod fill;
 mod gather;
 pub mod interface;
 pub mod straight;
+pub mod surface;
 
 pub use gather::{Gathered, SCRATCH};
 
@@ -18,6 +19,7 @@ use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::threads;
 use fill::Fill;
+use surface::VoidPart;
 
 /// Largest number of cells per task.
 const GRAIN: usize = 32;
@@ -128,10 +130,9 @@ impl Composition {
         self.fill.as_ref()
     }
 
-    /// The material that stands for the void and the share of the cell that it has, in a cell that is
-    /// filled in part.
-    pub fn void_in(&self, cell: usize) -> Option<(usize, f64)> {
-        self.fill.as_ref()?.void_in(cell)
+    /// The void of a cell that is filled in part.
+    pub fn void_in(&self, mesh: &Mesh, cell: usize) -> Option<VoidPart> {
+        VoidPart::of(mesh, self.fill.as_ref()?, cell)
     }
 
     /// Content of a cell.
@@ -197,7 +198,7 @@ impl Composition {
                 Some(Content::Solid)
             } else if fill.is_some_and(|fill| fill.of(cell) == 0.0) {
                 Some(Content::Empty)
-            } else if fill.is_some_and(|fill| fill.void_in(cell).is_some()) {
+            } else if fill.is_some_and(|fill| fill.is_partial(cell)) {
                 Some(Content::Mixed)
             } else {
                 content(particles, cell, kinds, background, version)

@@ -180,8 +180,8 @@ impl<const D: usize> Simulation<D> {
         let mesh = &self.plan.mesh;
         let [sum, cells] = threads::sum(0..mesh.cells(), |cell| {
             let range = self.particles.of_cell(cell);
-            let void = self.quadrature.composition().void_in(cell);
-            if range.is_empty() || void.is_some() {
+            let fill = self.quadrature.composition().fill();
+            if range.is_empty() || fill.is_some_and(|fill| fill.is_partial(cell)) {
                 return [0.0; 2];
             }
             let volume: f64 = self.particles.volume[range].iter().sum();

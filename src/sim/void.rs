@@ -55,11 +55,13 @@ impl<const D: usize> Simulation<D> {
     /// Whether nothing fills a point of a cell (reference coordinates).
     pub(super) fn is_void_at(&self, cell: usize, r: [f64; 2]) -> bool {
         let Some(fill) = self.quadrature.composition().fill() else { return false };
-        let Some((void, _)) = fill.void_in(cell) else { return fill.of(cell) == 0.0 };
+        if !fill.is_partial(cell) {
+            return fill.of(cell) == 0.0;
+        }
         let sides = self.quadrature.cut(cell).and_then(|cut| cut.sides.as_ref());
         sides.is_some_and(|Sides { between, cut, .. }| {
             let second = cut.line[0] + cut.line[1] * r[0] + cut.line[2] * r[1] < 0.0;
-            cut.trust > 0.0 && between[usize::from(second)] == void
+            cut.trust > 0.0 && between[usize::from(second)] == fill.void()
         })
     }
 

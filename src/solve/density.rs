@@ -159,7 +159,7 @@ impl Density {
                 }
                 Content::Mixed => {
                     self.gather(mesh, cell, particles, materials);
-                    if let Some(void) = quadrature.composition().void_in(cell) {
+                    if let Some(void) = quadrature.composition().void_in(mesh, cell) {
                         self.centroids.add_void(void, quadrature.composition().factors());
                     }
                     self.help(mesh, cell, particles, materials);

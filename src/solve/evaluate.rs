@@ -132,12 +132,12 @@ impl Evaluation<'_> {
             }
             Form::Sides { cut, between } => self.sides(cell, cut, between, (scratch, out)),
             Form::Film | Form::Weights | Form::Drops { .. } | Form::Mixture => match void {
-                Some((_, share)) => self.spread(cell, 1.0 - share),
+                Some(void) => self.spread(cell, 1.0 - void.share),
                 None => return,
             },
         };
-        if let Some((_, share)) = void {
-            *out.mean_viscosity /= 1.0 - share;
+        if let Some(void) = void {
+            *out.mean_viscosity /= 1.0 - void.share;
         }
         *out.cut = Some(match kept {
             Some(mut kept) => {
@@ -181,7 +181,8 @@ impl Evaluation<'_> {
         (scratch, out): (&Gathered, &mut CellMut),
     ) -> CutStiffness {
         let measure = self.mesh.cell_measure(cell);
-        let void = self.void_in(cell).map(|(m, share)| (usize::from(between[1] == m), share));
+        let void = self.void_in(cell);
+        let void = void.map(|void| (usize::from(between[1] == void.material), void.share));
         // Where one side is void, it has a part of the viscosities of the other.
         let with_void = |laws: [PointLaw; 2]| match void {
             Some((side, _)) => {

@@ -3,6 +3,7 @@
 
 use super::last_flow::LastFlow;
 use crate::composition::fill::Fill;
+use crate::composition::surface::VoidPart;
 use crate::composition::{Content, Gathered, Kind};
 use crate::laws::Here;
 use crate::laws::director::Orientation;
@@ -40,9 +41,9 @@ pub struct Evaluation<'a> {
 }
 
 impl Evaluation<'_> {
-    /// The material that stands for a void and its share, in a cell that is filled in part.
-    pub(super) fn void_in(&self, cell: usize) -> Option<(usize, f64)> {
-        self.fill?.void_in(cell)
+    /// The void of a cell that is filled in part.
+    pub(super) fn void_in(&self, cell: usize) -> Option<VoidPart> {
+        VoidPart::of(self.mesh, self.fill?, cell)
     }
 
     /// State of a material at a point of a cell.

@@ -10,6 +10,7 @@ mod round;
 mod run;
 mod solids;
 mod trials;
+mod voids;
 
 pub use page::{json, markdown, table};
 pub use run::{keep, run_all};

@@ -117,14 +117,21 @@ impl Worst {
 }
 
 /// Sum over cells of |volume of particles - area|, over the total area, relative to the share of
-/// one row of particles in a cell.
+/// one row of particles in a cell. With a void, cells may lack volume: twice the sum of what is too much in
+/// some, over the volume of the particles.
 fn misplaced_volume(run: &dyn Run) -> f64 {
     let (mesh, particles) = (&run.plan().mesh, run.particles());
     let (mut wrong, mut all) = (0.0, 0.0);
     for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
         let volume: f64 = particles.of_cell(cell).map(|p| particles.volume[p]).sum();
-        wrong += (volume - mesh.cell_volume(cell)).abs();
-        all += mesh.cell_volume(cell);
+        let excess = volume - mesh.cell_volume(cell);
+        if run.plan().void().is_some() {
+            wrong += 2.0 * excess.max(0.0);
+            all += volume;
+        } else {
+            wrong += excess.abs();
+            all += mesh.cell_volume(cell);
+        }
     }
     wrong / all * run.plan().method.seeding.side as f64
 }

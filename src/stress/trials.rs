@@ -25,6 +25,7 @@ pub fn all() -> Result<Vec<Trial>, CaseError> {
     super::round::trials(&mut out)?;
     super::grains::trials(&mut out);
     super::solids::trials(&mut out);
+    super::voids::trials(&mut out);
     Ok(out
         .into_iter()
         .map(|t| {
