@@ -5,6 +5,7 @@ use super::Effort;
 use super::report::{Bound, Figure, Section, Table, number};
 use crate::cases::{CaseError, start};
 use crate::scene::SceneSource;
+use crate::sim::Run;
 
 /// Values of `accuracy.quadrature` that are compared.
 const RULES: [&str; 3] = ["sides", "laminate", "particles"];
@@ -72,6 +73,7 @@ pub fn section(effort: Effort) -> Result<Section, CaseError> {
     };
     tilts(effort, &mut out)?;
     slump(effort, &mut out)?;
+    current(effort, &mut out)?;
     Ok(out)
 }
 
@@ -292,4 +294,83 @@ fn slumping(contrast: f64, cells: u32, rule: &str) -> SceneSource {
          shape.rectangle = {{ x = [0, 1], y = [0, 1] }}\n"
     );
     SceneSource::new("slump", text)
+}
+
+/// Range of the fronts of a gravity current that are compared, m.
+const FRONTS: [f64; 2] = [3.3, 6.0];
+
+/// A viscous gravity current of 1 m2 over a rough floor, beside a free-slip wall, against its similarity
+/// solution: H. E. Huppert, "The propagation of two-dimensional and axisymmetric viscous gravity currents over
+/// a rigid horizontal surface", J. Fluid Mech. 121 (1982) 43.
+fn current(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
+    let title = "Front of a gravity current, 3.3 to 6 m from the wall, over 1.411 (g V^3/(3 nu))^(1/5) \
+                 (t + t0)^(1/5)";
+    let header = ["cells per m", "background", "t0, s", "least", "most", "steps"];
+    let mut table = Table::new(title, &header);
+    for &(cells, background) in effort.take(&[(8, "void"), (16, "void"), (8, "air"), (16, "air")]) {
+        let mut run = start(&spreading(cells, background))?;
+        let mut path = vec![];
+        loop {
+            let front = front(run.as_ref());
+            if front > FRONTS[0] && front <= FRONTS[1] {
+                path.push((run.row().time, front));
+            }
+            if run.is_finished() || front > FRONTS[1] {
+                break;
+            }
+            run.step()?;
+        }
+        // g = 10 m/s2, V = 1 m2, nu = 1 m2/s.
+        let scale = 1.411_f64.powi(5) * 10.0 / 3.0;
+        // The range of the ratios to the solution that started `lag` earlier.
+        let ratios = |lag: f64| {
+            let all = path.iter().map(|(t, x)| x / (scale * (t + lag)).powf(0.2));
+            all.fold((f64::INFINITY, 0.0_f64), |(least, most), r| (least.min(r), most.max(r)))
+        };
+        let off = |(least, most): (f64, f64)| (most - 1.0).max(1.0 - least);
+        let lags = (-100..1000).map(|k| 0.1 * f64::from(k));
+        let lag = lags.min_by(|a, b| off(ratios(*a)).total_cmp(&off(ratios(*b)))).unwrap_or(0.0);
+        let (least, most) = ratios(lag);
+        table.rows.push(vec![
+            cells.to_string(),
+            background.into(),
+            format!("{lag:.1}"),
+            format!("{least:.4}"),
+            format!("{most:.4}"),
+            run.row().step.to_string(),
+        ]);
+        let what = format!("gravity current, {cells} cells per m, {background}: front");
+        let bound = Bound::AtMost(if cells < 16 { 0.04 } else { 0.03 });
+        // A film of air stays under the front and lets it glide.
+        if background == "void" {
+            out.check(what, off((least, most)), bound);
+        } else {
+            out.aim(what, off((least, most)), bound);
+        }
+    }
+    out.tables.push(table);
+    Ok(())
+}
+
+/// Distance of the farthest particle of the first material, m.
+fn front(run: &dyn Run) -> f64 {
+    let (p, plan) = (run.particles(), run.plan());
+    let of_mud = (0..p.len()).filter(|&k| p.material[k] == 0);
+    of_mud.map(|k| plan.si(p.position[k])[0]).fold(0.0, f64::max)
+}
+
+fn spreading(cells: u32, background: &str) -> SceneSource {
+    let around = match background {
+        "void" => "background = \"void\"\n",
+        _ => "",
+    };
+    let text = format!(
+        "schema = 1\nname = \"current\"\n{around}gravity = [0, -10]\n[domain]\nx = [0, 12]\n\
+         y = [0, 1]\nlength_scale = 1\n[accuracy]\ncells = {cells}\n[time]\nend = 1000\n[boundaries]\n\
+         right.kind = \"no_slip\"\nbottom.kind = \"no_slip\"\n\
+         [materials.mud]\ndensity = 1000\nshear_viscosity = 1000\n\
+         [materials.air]\nshear_viscosity = 1e-3\nbackground = true\n\
+         [[regions]]\nmaterial = \"mud\"\nshape.rectangle = {{ x = [0, 2], y = [0, 0.5] }}\n"
+    );
+    SceneSource::new("current", text)
 }
