@@ -108,7 +108,8 @@ impl<const D: usize> Simulation<D> {
     /// Whether a node has a velocity of a material: it is not inside of a solid, and no cell around it is
     /// left out.
     fn moves(&self, node: usize) -> bool {
-        !self.reach.inside(node) && !(self.plan.effects.void && self.stokes.is_left_out(node))
+        let left_out = self.plan.effects.void && self.stokes.is_left_out(node);
+        !left_out && !self.reach.inside(node)
     }
 
     /// Projected area of a material over the volume of its particles.
