@@ -143,7 +143,7 @@ fn the_plan_states_flow_curves_pressure_and_inertia() {
         "- the zero of the pressure",
         "the boundaries determine the pressure",
         "+ inertia",
-        "the rotation of grains has no inertia",
+        "inertia of the rotation   left out",
         "iterations of the flow curves, momentum",
     ]);
     let closed = COLUMN.replace("top.kind = \"open\"\n", "");
