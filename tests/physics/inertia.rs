@@ -195,8 +195,8 @@ top.kind = "periodic"
 fn a_couple_turns_grains_with_inertia_gradually() {
     // rho j dw/dt = c - 4 eta_c w, with a uniform rotation that moves nothing.
     let at = |run: &dyn Run| run.velocity_at([0.3, 0.6]);
-    let errors = [0.02, 0.01].map(|step| {
-        let mut run = scene(TURNING, &[&format!("time.max_step={step}")]);
+    let errors = [0.05, 0.025].map(|step| {
+        let mut run = scene(TURNING, &["recording.frames=1", &format!("time.max_step={step}")]);
         assert!(at(&*run)[2].abs() < 1e-5);
         finish(run.as_mut(), |run| {
             let [u, v, w] = at(run);
@@ -207,7 +207,7 @@ fn a_couple_turns_grains_with_inertia_gradually() {
         let exact = 0.3 / 0.2 * (1.0 - (-0.2 * run.row().time / 0.2).exp());
         (at(&*run)[2] / exact - 1.0).abs()
     });
-    assert!(errors[1] < 1e-4 && errors[0] / errors[1] > 3.5, "{errors:?}");
+    assert!(errors[1] < 2e-4 && errors[0] / errors[1] > 3.5, "{errors:?}");
 }
 
 #[test]
