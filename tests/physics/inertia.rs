@@ -202,8 +202,8 @@ fn a_couple_turns_grains_with_inertia_gradually() {
             let [u, v, w] = at(run);
             assert!(u.hypot(v) < 1e-10, "{u} {v}");
             assert!((run.row().kinetic_energy - 0.1 * w * w).abs() < 1e-10 * w * w);
-            assert!(run.row().energy_error.abs() < 1e-2, "{}", run.row().energy_error);
         });
+        assert!(run.row().energy_error.abs() < 5e-3, "{}", run.row().energy_error);
         let exact = 0.3 / 0.2 * (1.0 - (-0.2 * run.row().time / 0.2).exp());
         (at(&*run)[2] / exact - 1.0).abs()
     });
