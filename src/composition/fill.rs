@@ -13,6 +13,7 @@
 
 use crate::space::constraints::FixedSides;
 use crate::space::mesh::Mesh;
+use crate::space::neighbours::joined;
 use crate::space::particles::Particles;
 use crate::space::shape::side_normal;
 use crate::threads;
@@ -38,10 +39,6 @@ pub struct Fill {
     volume: Vec<f64>,
     /// Filled share of each cell, from 0 to 1.
     share: Vec<f64>,
-    /// Number of the body that each cell belongs to; 0 for empty cells and in the search for bodies.
-    body: Vec<u32>,
-    /// Cells of a body, in the search.
-    members: Vec<usize>,
     /// Cells of the largest body that nothing holds.
     largest_loose: Vec<usize>,
 }
@@ -109,38 +106,28 @@ impl Fill {
     /// Empties the cells of bodies that nothing holds: cells that are joined by faces and touch no sides
     /// that prescribe velocities along both directions. Without inertia they would fall at any speed.
     fn release(&mut self, mesh: &Mesh, walls: &[FixedSides]) {
-        let Fill { share, body, members, largest_loose, .. } = self;
+        let Fill { share, largest_loose, .. } = self;
         largest_loose.clear();
-        body.clear();
-        body.resize(mesh.cells(), 0);
-        let mut bodies = 0;
+        let mut seen = vec![false; mesh.cells()];
         for start in 0..mesh.cells() {
-            if share[start] == 0.0 || body[start] != 0 {
+            if share[start] == 0.0 || seen[start] {
                 continue;
             }
-            bodies += 1;
-            members.clear();
-            members.push(start);
-            body[start] = bodies;
-            let (mut next, mut held) = (0, [false; 2]);
-            while let Some(&cell) = members.get(next) {
-                next += 1;
-                for side in 0..4 {
-                    let normal = side_normal(side);
-                    let FixedSides { any, along } = walls[cell];
-                    held[1 - normal] |= along[side];
-                    held[normal] |= any[side];
-                    let Some(beyond) = mesh.beyond(cell, side) else { continue };
-                    if share[beyond] > 0.0 && body[beyond] == 0 {
-                        body[beyond] = bodies;
-                        members.push(beyond);
-                    }
-                }
+            let body = joined(start, &mut seen, |cell| {
+                let beyond = (0..4).filter_map(move |side| mesh.beyond(cell, side));
+                beyond.filter(|&c| share[c] > 0.0)
+            });
+            let mut held = [false; 2];
+            for (cell, side) in body.iter().flat_map(|&cell| (0..4).map(move |side| (cell, side))) {
+                let normal = side_normal(side);
+                let FixedSides { any, along } = walls[cell];
+                held[1 - normal] |= along[side];
+                held[normal] |= any[side];
             }
             if held != [true; 2] {
-                members.iter().for_each(|&cell| share[cell] = 0.0);
-                if members.len() > largest_loose.len() {
-                    largest_loose.clone_from(members);
+                body.iter().for_each(|&cell| share[cell] = 0.0);
+                if body.len() > largest_loose.len() {
+                    *largest_loose = body;
                 }
             }
         }

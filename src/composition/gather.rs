@@ -143,6 +143,11 @@ impl Gathered {
         self.void = Some(void);
     }
 
+    /// The void of the cell, after [`Gathered::add_void`].
+    pub fn void(&self) -> Option<VoidPart> {
+        self.void
+    }
+
     /// The two materials of the cell and the particles around it; `None` if the cell has more or
     /// fewer materials.
     pub fn neighbourhood(

@@ -18,7 +18,7 @@ use crate::solve::density::Density;
 use crate::solve::quadrature::Quadrature;
 use crate::solve::stokes::Stokes;
 use crate::space::mesh::Mesh;
-use crate::space::neighbours::{Neighbours, open_faces};
+use crate::space::neighbours::{Neighbours, joined, open_faces};
 use crate::space::particles::Particles;
 use crate::space::population::Population;
 use crate::space::shape::side_point;
@@ -233,17 +233,10 @@ fn trapped(plan: &Plan, sources_on: &[bool]) -> Option<[f64; 2]> {
         if seen[first] {
             continue;
         }
-        let (mut list, mut next) = (vec![first], 0);
-        seen[first] = true;
-        while let Some(&cell) = list.get(next) {
-            next += 1;
-            for other in neighbours.of(cell) {
-                if !seen[other] && is_open(mesh, cell, side_towards(mesh, cell, other)) {
-                    seen[other] = true;
-                    list.push(other);
-                }
-            }
-        }
+        let list = joined(first, &mut seen, |cell| {
+            let opens = move |&c: &usize| is_open(mesh, cell, side_towards(mesh, cell, c));
+            neighbours.of(cell).filter(opens)
+        });
         if list.iter().any(|&c| opens[c]) {
             continue;
         }

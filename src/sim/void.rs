@@ -12,6 +12,7 @@ use crate::composition::fill::Fill;
 use crate::plan::Plan;
 use crate::solve::sides::Sides;
 use crate::space::mesh::{Axis, Mesh};
+use crate::space::neighbours::joined;
 
 /// Number of layers of nodes into which velocities are continued.
 const LAYERS: usize = 8;
@@ -85,42 +86,28 @@ impl<const D: usize> Simulation<D> {
 /// one in a closed domain, whose volume the material determines.
 fn trapped(plan: &Plan, fill: &Fill) -> Option<usize> {
     let mesh = &*plan.mesh;
-    let open_at = |side: usize| {
-        let pieces = plan.boundary.pieces().filter(move |(s, piece)| *s == side && piece.open);
-        pieces
-            .flat_map(move |(s, piece)| piece.segment.cells_at_side(mesh, s).map(|(_, cell)| cell))
-    };
     let mut reaches_open = vec![false; mesh.cells()];
-    (0..4).flat_map(open_at).for_each(|cell| reaches_open[cell] = true);
+    for (side, piece) in plan.boundary.pieces().filter(|(_, piece)| piece.open) {
+        let cells = piece.segment.cells_at_side(mesh, side);
+        cells.for_each(|(_, cell)| reaches_open[cell] = true);
+    }
     // Cells that are mostly filled do not join voids.
-    let has_void = |cell: usize| !mesh.solid[cell] && fill.of(cell) < 0.5;
+    let has_void = |cell: &usize| !mesh.solid[*cell] && fill.of(*cell) < 0.5;
     let mut seen = vec![false; mesh.cells()];
-    let (mut members, mut enclosed) = (vec![], vec![]);
-    let mut voids = 0;
+    let (mut voids, mut enclosed) = (0, None);
     for start in (0..mesh.cells()).filter(|&c| !mesh.solid[c] && fill.of(c) == 0.0) {
         if seen[start] {
             continue;
         }
         voids += 1;
-        members.clear();
-        members.push(start);
-        seen[start] = true;
-        let (mut next, mut opens) = (0, false);
-        while let Some(&cell) = members.get(next) {
-            next += 1;
-            opens |= reaches_open[cell];
-            for beyond in (0..4).filter_map(|side| mesh.beyond(cell, side)) {
-                if has_void(beyond) && !seen[beyond] {
-                    seen[beyond] = true;
-                    members.push(beyond);
-                }
-            }
-        }
-        if !opens {
-            enclosed.push(start);
+        let void = joined(start, &mut seen, |cell| {
+            (0..4).filter_map(move |side| mesh.beyond(cell, side)).filter(has_void)
+        });
+        if !void.iter().any(|&cell| reaches_open[cell]) {
+            enclosed = enclosed.or(Some(start));
         }
     }
-    enclosed.first().copied().filter(|_| voids > 1 || !plan.boundary.closed)
+    enclosed.filter(|_| voids > 1 || !plan.boundary.closed)
 }
 
 /// Continues nodal velocities from the nodes that are `known`; the others become zero.

@@ -11,6 +11,7 @@ use super::points::{CutStiffness, IntegrationPoint, Place, VOID};
 use super::sides::{self, Sides};
 use crate::composition::interface::Interface;
 use crate::composition::straight::StraightCut;
+use crate::composition::surface::VoidPart;
 use crate::composition::{Content, Gathered};
 use crate::laws::director::Orientation;
 use crate::laws::mixture::Mixture;
@@ -91,7 +92,7 @@ impl Evaluation<'_> {
         scratch: &mut Gathered,
     ) {
         scratch.gather(self.mesh, cell, self.particles, self.kinds);
-        let void = self.void_in(cell);
+        let void = self.fill.and_then(|fill| VoidPart::of(self.mesh, fill, cell));
         if let Some(void) = void {
             scratch.add_void(void, self.factors);
         }
@@ -181,8 +182,8 @@ impl Evaluation<'_> {
         (scratch, out): (&Gathered, &mut CellMut),
     ) -> CutStiffness {
         let measure = self.mesh.cell_measure(cell);
-        let void = self.void_in(cell);
-        let void = void.map(|void| (usize::from(between[1] == void.material), void.share));
+        let void =
+            scratch.void().map(|void| (usize::from(between[1] == void.material), void.share));
         // Where one side is void, it has a part of the viscosities of the other.
         let with_void = |laws: [PointLaw; 2]| match void {
             Some((side, _)) => {

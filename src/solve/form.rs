@@ -30,7 +30,7 @@ impl Evaluation<'_> {
     /// Arrangement of the materials in a gathered cell.
     pub(super) fn form(&self, cell: usize, scratch: &mut Gathered) -> Form {
         if self.rule == Rule::Sides
-            && (self.void_in(cell).is_some() || self.densities_differ(scratch.volumes()))
+            && (scratch.void().is_some() || self.densities_differ(scratch.volumes()))
         {
             let Some(between) = present(scratch.volumes()) else { return Form::Weights };
             let viscosity = self.materials.iter().map(|m| m.viscosity);

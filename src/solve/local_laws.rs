@@ -3,7 +3,6 @@
 
 use super::last_flow::LastFlow;
 use crate::composition::fill::Fill;
-use crate::composition::surface::VoidPart;
 use crate::composition::{Content, Gathered, Kind};
 use crate::laws::Here;
 use crate::laws::director::Orientation;
@@ -41,11 +40,6 @@ pub struct Evaluation<'a> {
 }
 
 impl Evaluation<'_> {
-    /// The void of a cell that is filled in part.
-    pub(super) fn void_in(&self, cell: usize) -> Option<VoidPart> {
-        VoidPart::of(self.mesh, self.fill?, cell)
-    }
-
     /// State of a material at a point of a cell.
     pub(super) fn here<'o>(
         &self,

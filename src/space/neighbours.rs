@@ -56,3 +56,24 @@ pub fn open_faces(mesh: &Mesh, enclosure: &Enclosure) -> Vec<Face> {
     }
     faces
 }
+
+/// The cells that are joined to a cell, itself first: `onwards` gives those joined to a cell directly. They are
+/// marked in `seen`; cells that are marked already are left out.
+pub fn joined<I: Iterator<Item = usize>>(
+    first: usize,
+    seen: &mut [bool],
+    onwards: impl Fn(usize) -> I,
+) -> Vec<usize> {
+    let (mut list, mut next) = (vec![first], 0);
+    seen[first] = true;
+    while let Some(&cell) = list.get(next) {
+        next += 1;
+        for other in onwards(cell) {
+            if !seen[other] {
+                seen[other] = true;
+                list.push(other);
+            }
+        }
+    }
+    list
+}
