@@ -11,6 +11,7 @@ mod free_rule;
 pub mod incidence;
 pub mod kink;
 pub mod measure;
+mod merging;
 pub mod mesh;
 pub mod neighbours;
 pub mod outline;

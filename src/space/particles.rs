@@ -165,8 +165,17 @@ impl Particles {
         });
     }
 
-    /// Removes the particles for which `gone` is true; the others keep their order.
+    /// Removes the particles for which `gone` is true; the others keep their order, and stay sorted.
     pub fn remove(&mut self, gone: &[bool]) {
+        let mut kept = 0;
+        for cell in 0..self.cell_start.len().saturating_sub(1) {
+            let all = self.of_cell(cell);
+            self.cell_start[cell] = kept;
+            kept += gone[all].iter().filter(|&&gone| !gone).count() as u32;
+        }
+        if let Some(end) = self.cell_start.last_mut() {
+            *end = kept;
+        }
         for_columns!(self, |c| {
             let mut i = 0;
             c.retain(|_| {
@@ -183,6 +192,19 @@ impl Particles {
         let position = &self.position;
         threads::for_each(cells, GRAIN, |p, cell| *cell = mesh.locate(position[p]) as u32);
         self.sort_by_cells(mesh.cells());
+    }
+
+    /// Sorts particles of which the last ones were added to sorted ones, in the cells `added`. The order
+    /// is the same as that of [`Particles::sort`].
+    pub fn settle(&mut self, added: &[u32]) {
+        let Particles { cell_start, sorting, .. } = self;
+        let count = cell_start.len() - 1;
+        sorting.cells.clear();
+        for cell in 0..count {
+            sorting.cells.resize(cell_start[cell + 1] as usize, cell as u32);
+        }
+        sorting.cells.extend_from_slice(added);
+        self.sort_by_cells(count);
     }
 
     /// Sorts particles that were sorted before and then moved into `cells`, and removes those whose
@@ -321,15 +343,8 @@ impl Particles {
         let (va, vb) = (self.volume[a], self.volume[b]);
         let (fa, fb) = (va / (va + vb), vb / (va + vb));
         self.volume[a] = va + vb;
-        let before = self.position[a];
-        for c in 0..2 {
-            let (x, y) = (self.position[a][c], self.position[b][c]);
-            // By rounding, the mean of two points on a side of the domain may lie beyond it.
-            self.position[a][c] = (fa * x + fb * y).clamp(x.min(y), x.max(y));
-        }
-        if mesh.is_solid_in(cell, self.position[a]) {
-            self.position[a] = before;
-        }
+        self.position[a] =
+            merged_position(mesh, cell, [(self.position[a], va), (self.position[b], vb)]);
         if let Some(d) = &mut self.director {
             let [p, q] = [d[a], d[b]];
             let product = |i: usize, j: usize| fa * p[i] * p[j] + fb * q[i] * q[j];
@@ -340,6 +355,19 @@ impl Particles {
             column[a] = fa * column[a] + fb * column[b];
         }
     }
+}
+
+/// Position of the particle that two particles of a cell, with these positions and volumes, become: their
+/// centroid, or the position of the first one if that is inside of a solid.
+pub(super) fn merged_position(
+    mesh: &Mesh,
+    cell: usize,
+    [(a, va), (b, vb)]: [([f64; 2], f64); 2],
+) -> [f64; 2] {
+    let (fa, fb) = (va / (va + vb), vb / (va + vb));
+    // By rounding, the mean of two points on a side of the domain may lie beyond it.
+    let mean = [0, 1].map(|c| (fa * a[c] + fb * b[c]).clamp(a[c].min(b[c]), a[c].max(b[c])));
+    if mesh.is_solid_in(cell, mean) { a } else { mean }
 }
 
 #[cfg(test)]

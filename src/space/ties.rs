@@ -13,12 +13,19 @@ pub(super) fn from_middle(mesh: &Mesh, p: [f64; 2]) -> f64 {
     x * x + y * y
 }
 
-/// The choice of least cost among `(cost, from_middle, choice)`; of equal costs, the choice nearest
-/// to the centre of the domain.
-pub(super) fn cheapest<T>(choices: impl Iterator<Item = (f64, f64, T)>) -> Option<T> {
-    let better = |a: &(f64, f64, T), b: &(f64, f64, T)| {
-        let slack = SAME * b.0.abs();
-        a.0 < b.0 - slack || (a.0 <= b.0 + slack && a.1 < b.1)
-    };
-    choices.reduce(|best, next| if better(&next, &best) { next } else { best }).map(|c| c.2)
+/// The choice of least cost among `(cost, choice)`; of equal costs, the choice nearest to the centre
+/// of the domain. `from_middle` gives the distance of a choice from there.
+pub(super) fn cheapest<T>(
+    mut choices: impl Iterator<Item = (f64, T)>,
+    from_middle: impl Fn(&T) -> f64,
+) -> Option<T> {
+    let (mut least, mut best) = choices.next()?;
+    for (cost, choice) in choices {
+        let slack = SAME * least.abs();
+        let equal = || cost <= least + slack && from_middle(&choice) < from_middle(&best);
+        if cost < least - slack || equal() {
+            (least, best) = (cost, choice);
+        }
+    }
+    Some(best)
 }
