@@ -1,5 +1,16 @@
 //! This module measures the transport of a material across a segment in two ways: it counts the
 //! particles that cross, and it integrates the flux of the velocity field.
+//!
+//! The flux of all materials is as smooth as the flow. The share of the gauge's material in it is a mean
+//! over what has crossed last, separately for both directions,
+//!
+//! ```text
+//! rate = Q m/a
+//! m' = m exp(-Q dt/W) + k Q dt,   a' = a exp(-Q dt/W) + Q dt
+//! ```
+//! with the flux `Q` of all materials, the share `k` of the particles near the gauge, and `W` the area of
+//! the gauge times two cells (of mean size, across it). With `k` instead of `m/a`, the rate of the
+//! default silo jumped by up to 16 % from step to step while single particles of the background passed.
 
 use crate::plan::Gauge;
 use crate::space::flow::Flow;
@@ -19,10 +30,23 @@ pub struct Counter {
     pub volume: f64,
     /// The same for volume that the refilling of empty cells has carried across it.
     pub refilled: f64,
+    /// What has crossed last, along the direction of the gauge and against it.
+    pub recent: [Amount; 2],
+}
+
+/// A volume, or a volume per time, in the plan's units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Amount {
+    /// That of all materials.
+    pub all: f64,
+    /// That of the gauge's material.
+    pub own: f64,
 }
 
 /// Number of flux samples along the edge of a cell.
 const SAMPLES: usize = 8;
+/// Cells that have crossed last; see the head of this module.
+const CELLS: f64 = 2.0;
 /// Widths of the kernel that determines the material at a sample, across and along the gauge, in
 /// cells.
 const KERNEL_WIDTH: [f64; 2] = [0.75, 0.25];
@@ -32,7 +56,7 @@ const ACROSS_CELLS: [f64; 2] = [0.25; 2];
 impl Counter {
     /// A counter at zero.
     pub fn new(gauge: Gauge) -> Self {
-        Counter { gauge, volume: 0.0, refilled: 0.0 }
+        Counter { gauge, volume: 0.0, refilled: 0.0, recent: [Amount::default(); 2] }
     }
 
     /// Counts a particle if its straight path (not wrapped) crosses the gauge.
@@ -70,29 +94,41 @@ impl Counter {
         sum
     }
 
-    /// Flux of the material along the gauge's direction, from the velocity field, in the plan's
-    /// units. The fraction of the material at a sample is a kernel mean over the particles of the
-    /// upstream cells nearby. With those of one cell only, the rate of the default silo jumps by up
-    /// to a quarter from step to step.
+    /// Flux of the material along the gauge's direction, in the plan's units; to be called once per
+    /// step, of length `dt`. `filled` gives the share of a cell that is not a void.
     pub fn rate<const D: usize>(
-        &self,
+        &mut self,
         mesh: &Mesh,
         flow: &Flow<D>,
-        particles: &Particles,
-        background: Option<u8>,
+        (particles, background): (&Particles, Option<u8>),
+        filled: &dyn Fn(usize) -> f64,
+        dt: f64,
     ) -> f64 {
-        let state = State { mesh, flow, particles, background };
+        let state = State { mesh, flow, particles, background, filled };
         let flux = match self.gauge.line {
             Line::Aligned(segment) => self.flux_along_mesh(segment, &state),
             Line::Slanted(ends) => self.flux_across_cells(ends, &state),
         };
-        // The sum makes a negative zero positive.
-        0.0 + self.gauge.sign * flux
+        let normal = self.gauge.line.normal();
+        let sizes = [&mesh.x, &mesh.y].map(|axis| axis.length() / axis.cells() as f64);
+        let across = normal[0].abs() * sizes[0] + normal[1].abs() * sizes[1];
+        let window = CELLS * across * flux.area;
+        let mut rates = [0.0; 2];
+        for (k, (rate, recent)) in rates.iter_mut().zip(&mut self.recent).enumerate() {
+            let now = flux.of[if self.gauge.sign > 0.0 { k } else { 1 - k }];
+            let (all, kept) = (now.all * dt, (-now.all * dt / window).exp());
+            if all > 0.0 {
+                recent.all = kept * recent.all + all;
+                recent.own = kept * recent.own + now.own * dt;
+            }
+            *rate = if recent.all > 0.0 { now.all * recent.own / recent.all } else { now.own };
+        }
+        rates[0] - rates[1]
     }
 
     /// Flux along the normal of a segment on mesh lines.
-    fn flux_along_mesh<const D: usize>(&self, segment: Segment, state: &State<D>) -> f64 {
-        let State { mesh, flow, particles, background } = *state;
+    fn flux_along_mesh<const D: usize>(&self, segment: Segment, state: &State<D>) -> Flux {
+        let State { mesh, flow, particles, background, filled } = *state;
         let material = self.gauge.material;
         let Segment { normal, at, from, to } = segment;
         let (across, along) = mesh.axes(normal);
@@ -101,7 +137,7 @@ impl Counter {
         let below = across.before(line);
         let above = (line < across.cells()).then_some(line);
         let cell = |m: Option<usize>, k: usize| m.map(|m| mesh.cell_across(normal, m, k));
-        let mut flux = 0.0;
+        let mut flux = Flux::default();
         for k in first..last {
             let Some(owner) = cell(above, k).or(cell(below, k)) else { continue };
             let edge = if above.is_some() { -1.0 } else { 1.0 };
@@ -122,12 +158,14 @@ impl Counter {
                     (segment.unit_normal(), KERNEL_WIDTH),
                     material,
                 );
-                let upstream = if u > 0.0 { below.or(above) } else { above.or(below) };
-                for near in around.clone().filter_map(|k| cell(upstream, k)) {
+                let row = if u > 0.0 { below.or(above) } else { above.or(below) };
+                let upstream = cell(row, k);
+                for near in around.clone().filter_map(|k| cell(row, k)) {
                     mean.add(particles, near);
                 }
                 let share = mean.value().unwrap_or(f64::from(background == Some(material)));
-                flux += share * u * face.of_point(1.0, t) / SAMPLES as f64;
+                let area = face.of_point(1.0, t) / SAMPLES as f64;
+                flux.add(area * upstream.map_or(1.0, |k| filled(k)), u, share);
             }
         }
         flux
@@ -135,12 +173,12 @@ impl Counter {
 
     /// Flux along the normal of a line in any direction. The fraction of the material at a sample is a mean
     /// over the particles of the cells around.
-    fn flux_across_cells<const D: usize>(&self, ends: [[f64; 2]; 2], state: &State<D>) -> f64 {
-        let State { mesh, flow, particles, background } = *state;
+    fn flux_across_cells<const D: usize>(&self, ends: [[f64; 2]; 2], state: &State<D>) -> Flux {
+        let State { mesh, flow, particles, background, filled } = *state;
         let material = self.gauge.material;
         let line = self.gauge.line;
         let normal = line.normal();
-        let mut flux = 0.0;
+        let mut flux = Flux::default();
         for (x, length) in Line::samples(ends, mesh, SAMPLES) {
             if mesh.is_solid_at(x) {
                 continue;
@@ -152,7 +190,7 @@ impl Counter {
             let mut mean = KernelMean::new(mesh, (owner, r), (normal, ACROSS_CELLS), material);
             mesh.block(owner).for_each(|near| mean.add(particles, near));
             let share = mean.value().unwrap_or(f64::from(background == Some(material)));
-            flux += share * u * length * mesh.thickness(x);
+            flux.add(length * mesh.thickness(x) * filled(owner), u, share);
         }
         flux
     }
@@ -165,6 +203,26 @@ struct State<'a, const D: usize> {
     flow: &'a Flow<D>,
     particles: &'a Particles,
     background: Option<u8>,
+    filled: &'a dyn Fn(usize) -> f64,
+}
+
+/// Flux across a gauge.
+#[derive(Clone, Copy, Debug, Default)]
+struct Flux {
+    /// Along the normal of the line, and against it; both are positive.
+    of: [Amount; 2],
+    /// Area without solids, and without voids.
+    area: f64,
+}
+
+impl Flux {
+    /// Adds a sample with the normal velocity `u` and the share of the gauge's material.
+    fn add(&mut self, area: f64, u: f64, share: f64) {
+        let amount = &mut self.of[usize::from(u < 0.0)];
+        amount.all += area * u.abs();
+        amount.own += area * u.abs() * share;
+        self.area += area;
+    }
 }
 
 /// Volume fraction of a material near a point: a mean over particles with a Gaussian kernel.

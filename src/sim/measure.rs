@@ -252,11 +252,13 @@ impl<const D: usize> Simulation<D> {
         }));
         let mut gauges = std::mem::take(&mut self.row.gauges);
         gauges.clear();
-        gauges.extend(self.gauges.iter().map(|g| GaugeRow {
+        let filling = (&self.particles, plan.background());
+        let fill = self.quadrature.composition().fill();
+        let filled = |cell: usize| fill.map_or(1.0, |fill| fill.of(cell));
+        gauges.extend(self.gauges.iter_mut().map(|g| GaugeRow {
             volume: g.volume * u.volume(),
             refilled: g.refilled * u.volume(),
-            rate: g.rate(&plan.mesh, &self.flow, &self.particles, plan.background())
-                * u.volume_rate(),
+            rate: g.rate(&plan.mesh, &self.flow, filling, &filled, dt) * u.volume_rate(),
         }));
         let mut ill_posed_share = 0.0;
         if plan.has_friction() {

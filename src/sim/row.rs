@@ -480,7 +480,7 @@ pub static PER_GAUGE: [Column; 3] = [
         symbol: "Q",
         unit: "m²/s",
         label: "rate",
-        meaning: "Flux of the gauge's material across it.",
+        meaning: "Flux of the gauge's material across it; its share in the flow is a mean over the last two cells that have crossed.",
         path: "rate",
         rank: Rank::Compared(1),
         panel: Some(Panel::OutflowRate),

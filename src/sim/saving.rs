@@ -6,6 +6,7 @@ use super::inertia::{Acceleration, Past};
 use super::row::{self, COLUMNS, GaugeRow, Row};
 use super::simulation::{Before, Simulation};
 use super::state::{State, StateError, flat, load_phases, save_phases, wrong_length};
+use crate::motion::gauges::Amount;
 use crate::plan::Pose;
 use crate::solve::last_flow::Iterate;
 use crate::space::count::Count;
@@ -210,6 +211,8 @@ impl<const D: usize> Simulation<D> {
         s.put_floats("quadrature.factors", self.factors_of_points.iter().copied());
         s.put_floats("gauges", self.gauges.iter().map(|g| g.volume));
         s.put_floats("gauges.refilled", self.gauges.iter().map(|g| g.refilled));
+        let recent = self.gauges.iter().flat_map(|g| g.recent).flat_map(|r| [r.all, r.own]);
+        s.put_floats("gauges.recent", recent);
         if let Some(dye) = &self.dye {
             s.put_floats("dye.points", dye.lines.iter().flatten().flatten().copied());
             s.put_counts("dye.lines", dye.lines.iter().map(|l| l.len() as u64));
@@ -315,10 +318,8 @@ impl<const D: usize> Simulation<D> {
         let refilled = s.exactly("gauges.refilled", self.gauges.len())?;
         let dye = self.dye.as_ref().map(|_| dye_lines(s)).transpose()?;
         let [splits, merges, held, left, healed] = s.tally("count")?;
-        let [volume_in, volume_out, energy_out] = match s.try_floats("count.exchanged") {
-            Some(_) => s.numbers("count.exchanged")?,
-            None => [0.0; 3],
-        };
+        let [volume_in, volume_out, energy_out] =
+            s.try_numbers("count.exchanged")?.unwrap_or_default();
         let [step, version, next_change] = s.tally("progress")?;
         let changes = plan.changes.get(..next_change as usize).ok_or(StateError::Range {
             name: "progress (changes)",
@@ -331,15 +332,9 @@ impl<const D: usize> Simulation<D> {
         let [time] = s.numbers("time")?;
         let [first_energy] = s.numbers("first_energy")?;
         let recent_energy = s.numbers("recent_energy")?;
-        let flowed = match s.try_floats("flowed") {
-            Some(_) => s.numbers("flowed")?,
-            None => [0.0; 2],
-        };
+        let flowed = s.try_numbers("flowed")?.unwrap_or_default();
         let loosened = s.tally("loosened").unwrap_or_default();
-        let trapped_void = match s.try_floats("trapped_void") {
-            Some(_) => Some(s.numbers("trapped_void")?),
-            None => None,
-        };
+        let trapped_void = s.try_numbers("trapped_void")?;
         let tolerated = s.floats("tolerated")?.first().copied();
         let baseline = s.exactly("baseline", materials)?;
         let [last_other_power] = s.numbers("other_power")?;
@@ -361,6 +356,10 @@ impl<const D: usize> Simulation<D> {
         }
         for ((gauge, &volume), &refilled) in self.gauges.iter_mut().zip(gauges).zip(refilled) {
             (gauge.volume, gauge.refilled) = (volume, refilled);
+        }
+        let recent = s.tuples("gauges.recent", 2 * self.gauges.len()).unwrap_or_default();
+        for (gauge, recent) in self.gauges.iter_mut().zip(recent.as_chunks().0) {
+            gauge.recent = recent.map(|[all, own]| Amount { all, own });
         }
         if let (Some(dye), Some(lines)) = (&mut self.dye, dye) {
             dye.lines = lines;

@@ -138,6 +138,11 @@ impl State {
         values.try_into().map_err(|_| wrong_length(name, values.len(), N))
     }
 
+    /// A column of exactly `N` numbers; `None` if the run has none of this name.
+    pub fn try_numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, StateError> {
+        self.try_floats(name).map(|_| self.numbers(name)).transpose()
+    }
+
     /// A column of exactly `N` counts.
     pub fn tally<const N: usize>(&self, name: &str) -> Result<[u64; N], StateError> {
         let values = self.counts(name)?;
