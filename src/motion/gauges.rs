@@ -165,7 +165,7 @@ impl Counter {
                 }
                 let share = mean.value().unwrap_or(f64::from(background == Some(material)));
                 let area = face.of_point(1.0, t) / SAMPLES as f64;
-                flux.add(area * upstream.map_or(1.0, |k| filled(k)), u, share);
+                flux.add(area * upstream.map_or(1.0, filled), u, share);
             }
         }
         flux
