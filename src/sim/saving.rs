@@ -211,8 +211,10 @@ impl<const D: usize> Simulation<D> {
         s.put_floats("quadrature.factors", self.factors_of_points.iter().copied());
         s.put_floats("gauges", self.gauges.iter().map(|g| g.volume));
         s.put_floats("gauges.refilled", self.gauges.iter().map(|g| g.refilled));
-        let recent = self.gauges.iter().flat_map(|g| g.recent).flat_map(|r| [r.all, r.own]);
-        s.put_floats("gauges.recent", recent);
+        if !self.gauges.is_empty() {
+            let recent = self.gauges.iter().flat_map(|g| g.recent).flat_map(|r| [r.all, r.own]);
+            s.put_floats("gauges.recent", recent);
+        }
         if let Some(dye) = &self.dye {
             s.put_floats("dye.points", dye.lines.iter().flatten().flatten().copied());
             s.put_counts("dye.lines", dye.lines.iter().map(|l| l.len() as u64));
