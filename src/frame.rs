@@ -4,6 +4,8 @@
 //! Snapshots do not depend on how they are drawn. [`RunInfo`] holds what is constant during a run;
 //! a [`Frame`] holds the results of one step.
 
+pub mod thinning;
+
 /// Results of one step. Most steps have scalars only.
 #[derive(Debug, Clone, Default)]
 pub struct Frame {

@@ -1,4 +1,4 @@
-//! This module writes counts and ordinals in sentences.
+//! This module writes counts in sentences.
 
 use std::fmt::Display;
 
@@ -9,18 +9,6 @@ pub fn count(n: impl Display, noun: &str) -> String {
     format!("{n} {noun}{ending}")
 }
 
-/// An ordinal: `1st`, `2nd`, `13th`.
-pub fn ordinal(n: usize) -> String {
-    let ending = match (n % 10, n % 100) {
-        (_, 11..=13) => "th",
-        (1, _) => "st",
-        (2, _) => "nd",
-        (3, _) => "rd",
-        _ => "th",
-    };
-    format!("{n}{ending}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -29,16 +17,5 @@ mod tests {
     fn numbers_are_followed_by_their_form() {
         let counts = [0, 1, 2].map(|n| count(n, "damaged row"));
         assert_eq!(counts, ["0 damaged rows", "1 damaged row", "2 damaged rows"]);
-        for (n, text) in [
-            (1, "1st"),
-            (2, "2nd"),
-            (3, "3rd"),
-            (4, "4th"),
-            (11, "11th"),
-            (112, "112th"),
-            (122, "122nd"),
-        ] {
-            assert_eq!(ordinal(n), text);
-        }
     }
 }

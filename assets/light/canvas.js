@@ -139,7 +139,9 @@ class PixelDiscs {
     return this.spans[quarters];
   }
 
-  draw(left, top, w, h, x, y, radius, paint, colours) {
+  // `depth`: if given, `this.depths` becomes the depth of the disc that is drawn on each pixel.
+  draw(left, top, w, h, x, y, radius, paint, colours, depth = null) {
+    if (depth) this.depths = new Float32Array(w * h);
     if (this.canvas.width !== w || this.canvas.height !== h) {
       [this.canvas.width, this.canvas.height] = [w, h];
       this.pen = penOf(this.canvas);
@@ -160,8 +162,10 @@ class PixelDiscs {
       for (let n = 0; n < rows.length; n += 2) {
         const row = cy + rows[n];
         if (row < 0 || row >= h) continue;
+        const start = row * w + Math.max(cx - rows[n + 1], 0);
         const stop = row * w + Math.min(cx + rows[n + 1] + 1, w);
-        for (let at = row * w + Math.max(cx - rows[n + 1], 0); at < stop; at++) pixels[at] = word;
+        for (let at = start; at < stop; at++) pixels[at] = word;
+        if (depth) this.depths.fill(depth[k], start, Math.max(start, stop));
       }
     }
     this.pen.putImageData(this.data, 0, 0);
@@ -169,58 +173,72 @@ class PixelDiscs {
   }
 }
 
-const GROWTH = 1.8; // mean radii by which discs grow, and are cut back, to fill gaps
+// Radii to which gaps between discs are filled: the mean radius, or that of the disc if it is larger.
+const GROWTH = 2.4;
 
-// Draws discs with the gaps between neighbours filled, on an image of half the size.
+// Draws discs with the gaps between neighbours filled, on an image of half the size: what is nearer to a
+// disc than GROWTH radii, less what is then nearer to the outside than this.
 class Cover {
-  constructor() { this.grown = new PixelDiscs(); }
+  constructor() { this.drawn = new PixelDiscs(); }
 
   draw(left, top, w, h, x, y, radius, paint, colours) {
     const [nx, ny] = [Math.max(1, Math.ceil(0.5 * w)), Math.max(1, Math.ceil(0.5 * h))];
     const n = x.length;
-    const [X, Y, R] = [new Float32Array(n), new Float32Array(n), new Float32Array(n)];
+    const [X, Y, R, depth] = [new Float32Array(n), new Float32Array(n), new Float32Array(n), new Float32Array(n)];
     let sum = 0;
     for (let k = 0; k < n; k++) sum += 0.5 * radius[k];
-    const depth = (GROWTH * sum) / Math.max(n, 1);
-    for (let k = 0; k < n; k++) [X[k], Y[k], R[k]] = [0.5 * (x[k] - left), 0.5 * (y[k] - top), 0.5 * radius[k] + depth];
-    const image = this.grown.draw(0, 0, nx, ny, X, Y, R, paint, colours);
-    cutBack(this.grown.pixels, nx, ny, depth);
-    this.grown.pen.putImageData(this.grown.data, 0, 0);
+    const mean = sum / Math.max(n, 1);
+    for (let k = 0; k < n; k++) {
+      [X[k], Y[k], R[k]] = [0.5 * (x[k] - left), 0.5 * (y[k] - top), 0.5 * radius[k]];
+      depth[k] = GROWTH * Math.max(R[k], mean);
+    }
+    const image = this.drawn.draw(0, 0, nx, ny, X, Y, R, paint, colours, depth);
+    const { pixels, depths } = this.drawn;
+    const [far, source] = [new Uint16Array(nx * ny), new Uint32Array(nx * ny)];
+    for (let k = 0; k < far.length; k++) [far[k], source[k]] = [pixels[k] ? 0 : FAR, k];
+    spread(nx, ny, far, source);
+    const inside = new Uint16Array(nx * ny);
+    for (let k = 0; k < far.length; k++) inside[k] = far[k] < FAR && far[k] <= 3 * depths[source[k]] ? FAR : 0;
+    spread(nx, ny, inside, new Uint32Array(nx * ny));
+    for (let k = 0; k < far.length; k++) {
+      if (far[k] > 0 && inside[k] > 3 * depths[source[k]]) pixels[k] = pixels[source[k]];
+    }
+    this.drawn.pen.putImageData(this.drawn.data, 0, 0);
     return image;
   }
 }
 
-// Empties the pixels that are nearer than `depth` to an empty one. Distances are sums of steps to
-// neighbours, of length 3 along the axes and 4 along diagonals, in thirds of a pixel.
-function cutBack(pixels, nx, ny, depth) {
-  const far = new Uint16Array(nx * ny);
+const FAR = 30000; // distance of pixels for which none is known
+
+// Spreads distances, and the pixels from which they are measured. Distances are sums of steps to neighbours,
+// of length 3 along the axes and 4 along diagonals, in thirds of a pixel.
+function spread(nx, ny, far, source) {
+  const relax = (k, near, step) => {
+    if (far[near] + step < far[k]) {
+      far[k] = far[near] + step;
+      source[k] = source[near];
+    }
+  };
   for (let j = 0; j < ny; j++) {
     for (let i = 0; i < nx; i++) {
       const k = j * nx + i;
-      if (pixels[k] === 0) continue;
-      let d = 30000;
-      if (i > 0) d = Math.min(d, far[k - 1] + 3);
+      if (i > 0) relax(k, k - 1, 3);
       if (j > 0) {
-        d = Math.min(d, far[k - nx] + 3);
-        if (i > 0) d = Math.min(d, far[k - nx - 1] + 4);
-        if (i + 1 < nx) d = Math.min(d, far[k - nx + 1] + 4);
+        relax(k, k - nx, 3);
+        if (i > 0) relax(k, k - nx - 1, 4);
+        if (i + 1 < nx) relax(k, k - nx + 1, 4);
       }
-      far[k] = d;
     }
   }
   for (let j = ny - 1; j >= 0; j--) {
     for (let i = nx - 1; i >= 0; i--) {
       const k = j * nx + i;
-      let d = far[k];
-      if (d === 0) continue;
-      if (i + 1 < nx) d = Math.min(d, far[k + 1] + 3);
+      if (i + 1 < nx) relax(k, k + 1, 3);
       if (j + 1 < ny) {
-        d = Math.min(d, far[k + nx] + 3);
-        if (i + 1 < nx) d = Math.min(d, far[k + nx + 1] + 4);
-        if (i > 0) d = Math.min(d, far[k + nx - 1] + 4);
+        relax(k, k + nx, 3);
+        if (i + 1 < nx) relax(k, k + nx + 1, 4);
+        if (i > 0) relax(k, k + nx - 1, 4);
       }
-      far[k] = d;
-      if (d <= 3 * depth) pixels[k] = 0;
     }
   }
 }

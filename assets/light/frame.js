@@ -29,8 +29,9 @@ const NO_VALUE = 4095;
 const FIELD_STEPS = 4094;
 const RADIUS_STEPS = 8;
 
-// The content of a frame, in metres: {count, x, y, material, radius (of each particle), lines (flat
-// arrays x, y, x, y, ...), strokes (x, y of both ends in turn), fields (by name), moving (outlines of
+// The content of a frame, in metres: {count, x, y, material, radius (of each particle), others (number of
+// others in the column of a particle, see src/light/columns.rs), across (angle of the direction across the
+// column, in 256ths of half a turn), lines (flat arrays x, y, x, y, ...), strokes (x, y of both ends in turn), fields (by name), moving (outlines of
 // solids that move, as lines)}.
 function decodeFrame(bytes, description) {
   const r = new Reader(bytes);
@@ -41,6 +42,7 @@ function decodeFrame(bytes, description) {
   const [rows, columns, lowY, lowX] = [r.take(count), r.take(count), r.take(count), r.take(count)];
   const material = r.take(count);
   const sizes = r.take(count);
+  const [others, across] = [r.take(count), r.take(count)];
   const radii = new Float32Array(256);
   for (let k = 0; k < 256; k++) radii[k] = size * 2 ** (-k / RADIUS_STEPS);
   const [x, y, radius] = [new Float32Array(count), new Float32Array(count), new Float32Array(count)];
@@ -95,7 +97,7 @@ function decodeFrame(bytes, description) {
     for (let k = 0; k < outline.length; k++) outline[k] = r.f32();
     moving.push(outline);
   }
-  return { count, x, y, material, radius, lines, strokes, fields, moving };
+  return { count, x, y, material, radius, others, across, lines, strokes, fields, moving };
 }
 
 // The value of a field at a point (m) by bilinear interpolation between the centres of its samples;

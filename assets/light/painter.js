@@ -4,7 +4,7 @@
 //   fill(x, y, w, h, colour)                 a rectangle
 //   clip(x, y, w, h), unclip()               restricts what follows to a rectangle
 //   cover(x, y, radius, paint, colours)      like discs, with the gaps between neighbouring discs
-//                                            filled: discs of twice the radius, cut back by it
+//                                            filled
 //   discs(x, y, radius, paint, colours)      arrays of centres and radii; the disc k has the colour
 //                                            colours[3 paint[k]], ... (red, green, blue)
 //   image(rgba, nx, ny, x, y, w, h)          an image, smoothly scaled; its first row is on top
@@ -128,10 +128,14 @@ function paint(surface, description, frame, moment, look, rect, unit) {
   surface.fill(fx, fy, fw, fh, theme.paper);
   surface.clip(fx, fy, fw, fh);
   const behind = frame.fields[look.field];
-  for (const [k, side] of sides.entries()) {
-    const mirrored = k === 1;
-    if (behind) surface.image(fieldImage(behind, description, look, mirrored), behind.nx, behind.ny, side(mirrored ? x1 : x0), Y(y1), scale * (x1 - x0), scale * (y1 - y0));
-    if (look.particles) paintParticles(surface, description, frame, look, place, mirrored);
+  if (behind) {
+    for (const [k, side] of sides.entries()) {
+      const mirrored = k === 1;
+      surface.image(fieldImage(behind, description, look, mirrored), behind.nx, behind.ny, side(mirrored ? x1 : x0), Y(y1), scale * (x1 - x0), scale * (y1 - y0));
+    }
+  }
+  if (look.particles) paintParticles(surface, description, frame, look, place);
+  for (const side of sides) {
     if (look.dye) for (const line of frame.lines) surface.line(map(line, side, Y), 1 * unit, theme.dye);
     if (look.strokes && frame.strokes.length) surface.segments(map(frame.strokes, side, Y), 1.2 * unit, theme.dye);
   }
@@ -160,34 +164,57 @@ function map(points, X, Y) {
   return out;
 }
 
-function paintParticles(surface, description, frame, look, { X, Y, scale }, mirrored) {
-  const n = frame.count;
-  const [x, y, r, paint] = [new Float32Array(n), new Float32Array(n), new Float32Array(n), new Uint8Array(n)];
-  const field = frame.fields[look.colour];
-  // Particles in stretched flow leave gaps in rows, which are no structure of the flow.
-  const draw = (colours, paint) => {
+function paintParticles(surface, description, frame, look, place) {
+  const mirrored = description.round ? [false, true] : [false];
+  // One drawing of both halves of a round flow fills gaps at the axis.
+  const discs = mirrored.map((m) => discsOf(frame, place, m));
+  const [x, y, r] = [0, 1, 2].map((c) => Float32Array.from(discs.flatMap((list) => list[c])));
+  const draw = (colours, shades) => {
+    const paint = Uint8Array.from(discs.flatMap(([, , , of], m) => of.map((k) => shades[m][k])));
+    // Particles in stretched flow leave gaps in rows, which are no structure of the flow.
     surface.cover(x, y, r, paint, colours);
     surface.discs(x, y, r, paint, colours);
   };
-  const [ox, oy] = [X(0), Y(0)];
-  const across = mirrored ? -scale : scale;
-  for (let k = 0; k < n; k++) {
-    x[k] = ox + across * frame.x[k];
-    y[k] = oy - scale * frame.y[k];
-    r[k] = scale * frame.radius[k];
-  }
+  const field = frame.fields[look.colour];
   if (!field) {
-    draw(description.materials.flatMap((m) => m.rgb), frame.material);
+    draw(description.materials.flatMap((m) => m.rgb), mirrored.map(() => frame.material));
     return;
   }
   const { ends, palette } = scaleOf(field, description, look);
-  const sign = mirrored && field.name === "rotation" ? -1 : 1;
-  for (let k = 0; k < n; k++) {
-    // Particles at the edge of a field have a value.
-    const value = sign * fieldAt(field, description, frame.x[k], frame.y[k], 1e-3);
-    paint[k] = value === value ? shade(value, ends) : 128;
+  const shadesOf = (sign) => {
+    const shades = new Uint8Array(frame.count);
+    for (let k = 0; k < frame.count; k++) {
+      // Particles at the edge of a field have a value.
+      const value = sign * fieldAt(field, description, frame.x[k], frame.y[k], 1e-3);
+      shades[k] = value === value ? shade(value, ends) : 128;
+    }
+    return shades;
+  };
+  draw(palette, mirrored.map((m) => shadesOf(m && field.name === "rotation" ? -1 : 1)));
+}
+
+// The discs of the particles on the surface: x, y, radius, and the particle of each disc. A particle has one
+// disc, and in a column a row of discs across it, up to nine tenths of halfway to the next column.
+function discsOf(frame, { X, Y, scale }, mirrored) {
+  const [x, y, r, of] = [[], [], [], []];
+  const [ox, oy] = [X(0), Y(0)];
+  const side = mirrored ? -scale : scale;
+  for (let k = 0; k < frame.count; k++) {
+    const radius = frame.radius[k];
+    const rows = frame.others[k];
+    const reach = rows ? Math.max((0.9 * Math.sqrt(Math.PI) * (rows + 1)) / 4 - 1, 0) : 0;
+    const half = Math.ceil(reach);
+    const angle = (Math.PI / 256) * frame.across[k];
+    const step = half ? (reach / half) * radius : 0;
+    const [dx, dy] = [step * Math.cos(angle), step * Math.sin(angle)];
+    for (let n = -half; n <= half; n++) {
+      x.push(ox + side * (frame.x[k] + n * dx));
+      y.push(oy - scale * (frame.y[k] + n * dy));
+      r.push(scale * radius);
+      of.push(k);
+    }
   }
-  draw(palette, paint);
+  return [x, y, r, of];
 }
 
 function paintAxes(surface, place, { round }, theme, unit) {

@@ -5,6 +5,7 @@
 //! the same scripts (`assets/light`): `frame.js` decodes, `painter.js` draws on an abstract surface.
 //! In pages the surface is a canvas; in [`film`] it is [`surface`], and the scripts run in QuickJS.
 
+mod columns;
 mod describe;
 pub mod film;
 pub mod pack;

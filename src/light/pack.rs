@@ -9,12 +9,14 @@
 //! | part | content |
 //! |---|---|
 //! | head | `u32`: particles, dye lines, points of dye lines, strokes, fields |
-//! | particles | bytes: box row, box column (differences), low byte of y, of x, material, radius |
+//! | particles | bytes: box row, box column (differences), low byte of y, of x, material, radius, others in its column and direction across it ([`Column`]) |
 //! | dye lines | `u32` number of points of each; differences of x and y in turn, zigzag, high, low |
 //! | strokes | x and y of both ends in turn: differences, zigzag, high bytes, low bytes |
 //! | field | `u16` index in the list of fields, width, height, 0; `f32` smallest and largest value, ends of the colour scale; differences from the left neighbour, zigzag, high bytes, low bytes |
 //! | solids that move | `u32` number, then of each `u32` number of points; `f32` x and y in turn |
 
+use super::columns::{Column, columns};
+use crate::frame::thinning::evenly;
 use crate::frame::{GridField, ParticleSnapshot, Rect, RunInfo, Snapshot, extent};
 
 /// Number of steps of a quantised value of a field; the number after the last step is "no value".
@@ -28,20 +30,16 @@ const RADIUS_STEPS: f32 = 8.0;
 /// Number of particles up to which all of a frame are packed, unless more are asked for.
 pub const MOST_PARTICLES: usize = 20_000;
 
-/// The number `n` such that at most `most` particles remain if every `n`-th of `count` is kept.
-pub fn spacing(count: usize, most: usize) -> usize {
-    count.div_ceil(most.max(1)).max(1)
-}
-
 /// A copy of particles with at most `most` of them, evenly chosen. Radii grow so that the area
 /// stays the same.
 fn thin(particles: &ParticleSnapshot, most: usize) -> ParticleSnapshot {
-    let every = spacing(particles.positions.len(), most);
-    let growth = (every as f32).sqrt();
+    let kept = evenly(&particles.positions, most);
+    let growth = (particles.positions.len() as f32 / kept.len().max(1) as f32).sqrt();
+    let of = |list: &[f32]| kept.iter().filter_map(|&k| Some(growth * list.get(k)?)).collect();
     ParticleSnapshot {
-        positions: particles.positions.iter().copied().step_by(every).collect(),
-        class: particles.class.iter().copied().step_by(every).collect(),
-        radii: particles.radii.iter().step_by(every).map(|r| growth * r).collect(),
+        positions: kept.iter().map(|&k| particles.positions[k]).collect(),
+        class: kept.iter().filter_map(|&k| particles.class.get(k).copied()).collect(),
+        radii: of(&particles.radii),
         scalar: None,
     }
 }
@@ -94,20 +92,20 @@ impl Place {
     }
 }
 
-/// A particle of a packed frame: place, material, radius.
-type Packed = ([u16; 2], u8, u8);
+/// A particle of a packed frame: place, material, radius, column.
+type Packed = ([u16; 2], u8, u8, Column);
 
 fn particles(particles: &ParticleSnapshot, place: Place, usual: f32, out: &mut Vec<u8>) {
     let radius = |k: usize| place.radius(particles.radii.get(k).copied().unwrap_or(usual));
     let class = |k: usize| particles.class.get(k).map_or(0, |&c| c.min(255) as u8);
-    let mut list: Vec<Packed> = particles
-        .positions
-        .iter()
+    let mut list: Vec<Packed> = columns(particles, usual)
+        .into_iter()
+        .zip(&particles.positions)
         .enumerate()
-        .map(|(k, &p)| (place.at(p), class(k), radius(k)))
+        .map(|(k, (column, &p))| (place.at(p), class(k), radius(k), column))
         .collect();
-    list.sort_unstable_by_key(|&([x, y], class, radius)| {
-        (y >> 8, x >> 8, class, radius, y & 255, x & 255)
+    list.sort_unstable_by_key(|&([x, y], class, radius, column)| {
+        (y >> 8, x >> 8, class, radius, y & 255, x & 255, column)
     });
     let mut column = |of: &dyn Fn(&Packed) -> u8| out.extend(list.iter().map(of));
     column(&|p| (p.0[1] >> 8) as u8);
@@ -116,8 +114,10 @@ fn particles(particles: &ParticleSnapshot, place: Place, usual: f32, out: &mut V
     column(&|p| p.0[0] as u8);
     column(&|p| p.1);
     column(&|p| p.2);
+    column(&|p| p.3.others);
+    column(&|p| p.3.across);
     // Boxes are stored as differences.
-    let start = out.len() - 6 * list.len();
+    let start = out.len() - 8 * list.len();
     for part in out[start..start + 2 * list.len()].chunks_mut(list.len().max(1)) {
         let mut last = 0;
         part.iter_mut().for_each(|v| (last, *v) = (*v, v.wrapping_sub(last)));
@@ -183,7 +183,7 @@ mod tests {
             scalar: None,
         };
         let thinned = thin(&particles, 300);
-        assert_eq!(thinned.positions.len(), 250);
+        assert_eq!(thinned.positions.len(), 300);
         let area = |p: &ParticleSnapshot| p.radii.iter().map(|r| r * r).sum::<f32>();
         assert!((area(&thinned) / area(&particles) - 1.0).abs() < 1e-4);
     }

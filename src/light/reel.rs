@@ -1,7 +1,7 @@
 //! This module reads the frames of a finished run and packs them for reports and films.
 
 use super::Description;
-use super::pack::{MOST_PARTICLES, pack, spacing};
+use super::pack::{MOST_PARTICLES, pack};
 use crate::frame::{GridField, RunInfo, Snapshot, extent};
 use crate::results::{Member, SAME_TIME};
 use indexmap::IndexMap;
@@ -92,8 +92,7 @@ impl Reel {
                 moving: at(&moving, *time).cloned().unwrap_or_default(),
                 ..Snapshot::default()
             };
-            let count = particles.positions.len();
-            reel.kept = reel.kept.max(count.div_ceil(spacing(count, detail.particles)));
+            reel.kept = reel.kept.max(particles.positions.len().min(detail.particles));
             for field in &snapshot.fields {
                 widen(&mut reel.ranges, &field.name, field.range);
             }

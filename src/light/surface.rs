@@ -7,8 +7,8 @@ use tiny_skia::{
     PixmapPaint, PremultipliedColorU8, Rect, Stroke, Transform,
 };
 
-/// Mean radii by which discs grow, and are cut back, to fill gaps.
-const GROWTH: f32 = 1.8;
+/// Radii to which gaps between discs are filled: the mean radius, or that of the disc if it is larger.
+const GROWTH: f32 = 2.4;
 
 /// An image, and the rectangle to which drawing is restricted.
 pub struct Surface {
@@ -82,44 +82,63 @@ impl Surface {
         self.clip = None;
     }
 
-    /// Draws discs with the gaps between neighbours filled: discs grown by [`GROWTH`] mean radii, of
-    /// which what is nearer to the outside than this is taken away.
+    /// Draws discs with the gaps between neighbours filled: what is nearer to a disc than [`GROWTH`]
+    /// radii, less what is then nearer to the outside than this.
     pub fn cover(&mut self, x: &[f32], y: &[f32], radius: &[f32], paint: &[u8], colours: &[u8]) {
-        let (w, h) = (self.image.width(), self.image.height());
-        let Some(mut grown) = Surface::new(w, h) else { return };
-        grown.clip = self.clip.clone();
-        let depth = GROWTH * radius.iter().sum::<f32>() / radius.len().max(1) as f32;
-        let large: Vec<f32> = radius.iter().map(|r| r + depth).collect();
-        grown.discs(x, y, &large, paint, colours);
-        let ends = grown.clip.map_or([0, 0, w as i32, h as i32], |c| c.0);
-        cut_back(&mut grown.image, ends, depth);
+        let Some(mut drawn) = Surface::new(self.image.width(), self.image.height()) else { return };
+        drawn.clip = self.clip.clone();
+        drawn.discs(x, y, radius, paint, colours);
+        let (width, ends) = (self.image.width(), drawn.ends());
+        let [nx, ny] = [0, 1].map(|c| (ends[c + 2] - ends[c]).max(0) as usize);
+        let at =
+            |k: usize| (ends[1] as usize + k / nx) * width as usize + ends[0] as usize + k % nx;
+        let mean = radius.iter().sum::<f32>() / radius.len().max(1) as f32;
+        let mut depth = vec![0f32; drawn.image.pixels().len()];
+        for ((&x, &y), &r) in x.iter().zip(y).zip(radius) {
+            disc(width, ends, [x, y], r, |at, _| depth[at] = GROWTH * r.max(mean));
+        }
+        // The nearest pixel of a disc, and whether its disc reaches so far when it grows.
+        let pixels = drawn.image.pixels_mut();
+        let filled = |k: usize| pixels[at(k)].alpha() >= 128;
+        let mut far: Vec<u16> = (0..nx * ny).map(|k| if filled(k) { 0 } else { FAR }).collect();
+        let mut source: Vec<usize> = (0..nx * ny).collect();
+        spread(nx, &mut far, &mut source);
+        let reach: Vec<f32> = source.iter().map(|&k| 3.0 * depth[at(k)]).collect();
+        let within = |k: usize| far[k] != FAR && f32::from(far[k]) <= reach[k];
+        let mut inside: Vec<u16> = (0..nx * ny).map(|k| if within(k) { FAR } else { 0 }).collect();
+        spread(nx, &mut inside, &mut (0..nx * ny).collect::<Vec<_>>());
+        let opaque = |pixel: PremultipliedColorU8| {
+            let c = pixel.demultiply();
+            tiny_skia::ColorU8::from_rgba(c.red(), c.green(), c.blue(), 255).premultiply()
+        };
+        for k in 0..nx * ny {
+            if f32::from(inside[k]) > reach[k] {
+                pixels[at(k)] = opaque(pixels[at(source[k])]);
+            } else if far[k] > 0 {
+                pixels[at(k)] = PremultipliedColorU8::TRANSPARENT;
+            }
+        }
         let mask = self.clip.as_ref().map(|c| &c.1);
         let paint = PixmapPaint::default();
-        self.image.draw_pixmap(0, 0, grown.image.as_ref(), &paint, Transform::identity(), mask);
+        self.image.draw_pixmap(0, 0, drawn.image.as_ref(), &paint, Transform::identity(), mask);
     }
 
     /// Draws discs; disc `k` has the colour `colours[3 paint[k]..]`.
     pub fn discs(&mut self, x: &[f32], y: &[f32], radius: &[f32], paint: &[u8], colours: &[u8]) {
-        let (width, height) = (self.image.width() as i32, self.image.height() as i32);
-        let ends = self.clip.as_ref().map_or([0, 0, width, height], |c| c.0);
-        let bounds = [ends[0].max(0), ends[1].max(0), ends[2].min(width), ends[3].min(height)];
+        let (width, ends) = (self.image.width(), self.ends());
         let pixels = self.image.pixels_mut();
         for (((&x, &y), &r), &paint) in x.iter().zip(y).zip(radius).zip(paint) {
-            let r = r.max(0.5);
-            let Some(colour) = colours.get(3 * usize::from(paint)..3 * usize::from(paint) + 3)
-            else {
-                continue;
-            };
-            let from = |v: f32, end: i32| ((v - r - 1.0).floor() as i32).max(end);
-            let to = |v: f32, end: i32| ((v + r + 1.0).ceil() as i32).min(end);
-            for j in from(y, bounds[1])..to(y, bounds[3]) {
-                for i in from(x, bounds[0])..to(x, bounds[2]) {
-                    let apart = (i as f32 + 0.5 - x).hypot(j as f32 + 0.5 - y);
-                    let cover = (r + 0.5 - apart).clamp(0.0, 1.0);
-                    blend(&mut pixels[(j * width + i) as usize], colour, cover);
-                }
-            }
+            let paint = 3 * usize::from(paint);
+            let Some(colour) = colours.get(paint..paint + 3) else { continue };
+            disc(width, ends, [x, y], r, |at, cover| blend(&mut pixels[at], colour, cover));
         }
+    }
+
+    /// Left, top, right and bottom end (pixels) of the part of the image to which drawing is restricted.
+    fn ends(&self) -> [i32; 4] {
+        let (width, height) = (self.image.width() as i32, self.image.height() as i32);
+        let ends = self.clip.as_ref().map_or([0, 0, width, height], |c| c.0);
+        [ends[0].max(0), ends[1].max(0), ends[2].min(width), ends[3].min(height)]
     }
 
     /// Draws an image of `nx` times `ny` pixels, smoothly scaled into a rectangle.
@@ -204,41 +223,45 @@ fn scale(font: &FontRef, size: f32) -> PxScale {
     PxScale::from(size * font.height_unscaled() / em)
 }
 
-/// Empties the pixels within a rectangle that are nearer than `depth` to an empty one. Distances are
-/// sums of steps to neighbours, of length 3 along the axes and 4 along diagonals, in thirds of a
-/// pixel.
-fn cut_back(image: &mut Pixmap, ends: [i32; 4], depth: f32) {
-    let (width, height) = (image.width() as i32, image.height() as i32);
-    let [left, top, right, bottom] =
-        [ends[0].max(0), ends[1].max(0), ends[2].min(width), ends[3].min(height)];
-    let (nx, ny) = ((right - left).max(0) as usize, (bottom - top).max(0) as usize);
-    let at = |i: usize, j: usize| ((top + j as i32) * width + left + i as i32) as usize;
-    let pixels = image.pixels_mut();
-    let mut far = vec![0u16; nx * ny];
-    let mut visit = |i: usize, j: usize, before: bool, far: &mut [u16]| {
-        if pixels[at(i, j)].alpha() < 128 {
-            pixels[at(i, j)] = PremultipliedColorU8::TRANSPARENT;
-            return;
+/// Calls `visit` for the pixels of a disc within a part of an image of the given width, with the number
+/// of the pixel and the fraction of it that the disc covers.
+fn disc(width: u32, ends: [i32; 4], [x, y]: [f32; 2], r: f32, mut visit: impl FnMut(usize, f32)) {
+    let r = r.max(0.5);
+    let from = |v: f32, end: i32| ((v - r - 1.0).floor() as i32).max(end);
+    let to = |v: f32, end: i32| ((v + r + 1.0).ceil() as i32).min(end);
+    for j in from(y, ends[1])..to(y, ends[3]) {
+        for i in from(x, ends[0])..to(x, ends[2]) {
+            let apart = (i as f32 + 0.5 - x).hypot(j as f32 + 0.5 - y);
+            visit((j * width as i32 + i) as usize, (r + 0.5 - apart).clamp(0.0, 1.0));
         }
-        let (x, y) = (i as i64, j as i64);
-        let sign = if before { -1 } else { 1 };
-        let mut least = if before { 30_000 } else { far[j * nx + i] };
+    }
+}
+
+/// Distance of pixels for which none is known.
+const FAR: u16 = 30_000;
+
+/// Spreads distances, and the pixels from which they are measured, in an image of rows of `nx` pixels.
+/// Distances are sums of steps to neighbours, of length 3 along the axes and 4 along diagonals, in thirds
+/// of a pixel.
+fn spread(nx: usize, far: &mut [u16], source: &mut [usize]) {
+    let ny = far.len() / nx.max(1);
+    let mut visit = |i: usize, j: usize, sign: i64| {
+        let k = j * nx + i;
         for (dx, dy, step) in [(sign, 0, 3), (0, sign, 3), (-1, sign, 4), (1, sign, 4)] {
-            let (x, y) = (x + dx, y + dy);
+            let (x, y) = (i as i64 + dx, j as i64 + dy);
             if (0..nx as i64).contains(&x) && (0..ny as i64).contains(&y) {
-                least = least.min(far[y as usize * nx + x as usize] + step);
+                let near = y as usize * nx + x as usize;
+                if far[near] + step < far[k] {
+                    (far[k], source[k]) = (far[near] + step, source[near]);
+                }
             }
-        }
-        far[j * nx + i] = least;
-        if !before && f32::from(least) <= 3.0 * depth {
-            pixels[at(i, j)] = PremultipliedColorU8::TRANSPARENT;
         }
     };
     for j in 0..ny {
-        (0..nx).for_each(|i| visit(i, j, true, &mut far));
+        (0..nx).for_each(|i| visit(i, j, -1));
     }
     for j in (0..ny).rev() {
-        (0..nx).rev().for_each(|i| visit(i, j, false, &mut far));
+        (0..nx).rev().for_each(|i| visit(i, j, 1));
     }
 }
 

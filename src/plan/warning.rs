@@ -1,6 +1,5 @@
 //! This module defines warnings about a scene or a run, with remedies.
 
-use crate::words::ordinal;
 use std::fmt;
 
 /// A warning; its text includes the remedy.
@@ -49,8 +48,10 @@ pub enum Warning {
     },
     /// There are more particles than are written per frame.
     ParticlesThinned {
-        /// Interval of the particles that are written.
-        every: usize,
+        /// Number of particles that are written.
+        recorded: usize,
+        /// Number of particles that could be drawn.
+        of: usize,
     },
     /// Dye lines are no longer refined.
     DyeCoarse {
@@ -158,10 +159,9 @@ impl fmt::Display for Warning {
                      no later one covers, or remove it"
                 )
             }
-            Warning::ParticlesThinned { every } => write!(
+            Warning::ParticlesThinned { recorded, of } => write!(
                 f,
-                "every {} particle is recorded; raise recording.max_particles for more",
-                ordinal(*every)
+                "{recorded} of {of} particles are recorded; raise recording.max_particles for more"
             ),
             Warning::DyeCoarse { points } => write!(
                 f,

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -12,6 +13,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{MAX_ERRORS, SceneError, closest, suggestion};
+use super::headers::tables_as_lists;
 use super::source::SceneSource;
 use super::types::Scene;
 use crate::words::count;
@@ -23,6 +25,10 @@ pub const SCHEMA: u32 = 1;
 const MAX_BYTES: usize = 1 << 20;
 /// Size of the largest text in which more than the first syntax error is searched for, bytes.
 const MAX_RECOVER: usize = 1 << 16;
+
+/// The JSON schema of scene files.
+static JSON_SCHEMA: LazyLock<serde_json::Value> =
+    LazyLock::new(|| schemars::schema_for!(Scene).to_value());
 
 /// Reads a scene file without parsing it. Directories and files that are too large, empty or not
 /// UTF-8 are refused.
@@ -67,6 +73,7 @@ pub fn parse(source: &SceneSource) -> Result<Scene, SceneError> {
 fn read(source: &SceneSource) -> Result<Scene, SceneError> {
     let mut root = table(source)?;
     check_schema(&root)?;
+    SceneError::join(tables_as_lists(source.text(), root.get_ref(), &JSON_SCHEMA))?;
     let mut errors: Vec<SceneError> = vec![];
     loop {
         match Scene::deserialize(toml::Deserializer::from(root.clone())) {
@@ -252,7 +259,6 @@ fn translate(e: &toml::de::Error) -> SceneError {
         let header = table.unwrap_or("...");
         let remedy = match (found.as_str(), wanted) {
             ("map", "a sequence") => format!(": write `[[{header}]]` instead of `[{header}]`"),
-            ("sequence", "a map") => format!(": write `[{header}]` instead of `[[{header}]]`"),
             _ => String::new(),
         };
         (format!("{shown}{within}"), format!("expected {}{remedy}", plain(wanted)), label)
@@ -302,7 +308,7 @@ pub fn is_folder_name(name: &str) -> bool {
 
 /// The JSON schema of scene files, for editors.
 pub fn json_schema() -> String {
-    format!("{:#}\n", schemars::schema_for!(Scene).as_value())
+    format!("{:#}\n", *JSON_SCHEMA)
 }
 
 #[cfg(test)]
@@ -358,6 +364,10 @@ mod tests {
         schema = 1 | # | no place | does not say `schema = 1` | as the first line
         [[gauges]] | [gauges] | [gauges | a table in `gauges` | write `[[gauges]]` instead of `[gauges]`
         gravity | schema = 1\ngravity | schema | duplicate key | remove one
+        [time] | [[time]] | [[time]] | a list in `time` | write `[time]` instead of `[[time]]`
+        schema = 1 | schema = 1\nmesh = [1] | [1] | a list in `mesh` | expected a table
+        [materials.grains] | [[materials]] | [[m | in `materials` | write `[materials.NAME]`
+        [materials.grains] | [[materials.grains]] | [[m | in `materials.grains` | write `[materials.grains]`
         [time] | [time | no place | not TOML | TOML syntax
         parameters.coupling | parameters.alpha | alpha | duplicate key | remove one
         cells = 6 | cells = many | many | must be quoted | in quotes

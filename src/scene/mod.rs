@@ -7,6 +7,7 @@
 
 pub mod error;
 pub mod expr;
+mod headers;
 pub mod keys;
 mod load;
 pub mod parameters;

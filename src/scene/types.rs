@@ -1580,8 +1580,8 @@ pub struct Recording {
     /// Quantity that colours the particles.
     #[schemars(extend("examples" = ["speed"]))]
     pub colour_by: ColourBy,
-    /// Largest number of particles per frame. If there are more, only every k-th one is written,
-    /// and the summary states this.
+    /// Largest number of particles per frame. If there are more, so many of them are written, evenly
+    /// chosen, and the summary states this.
     #[schemars(extend("x-unit" = "1", "x-range" = "≥ 0", "examples" = [100000]))]
     pub max_particles: u32,
     /// Fields written on a grid in each frame.

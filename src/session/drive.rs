@@ -94,6 +94,6 @@ pub fn warnings_at_start(plan: &Plan, run: &dyn Run) -> Vec<String> {
 
 /// The warning that frames do not show every particle; `None` if they do.
 pub fn thinned(plan: &Plan, run: &dyn Run) -> Option<String> {
-    let every = snapshot::thinning(plan, snapshot::drawn(plan, run.particles()).len());
-    (every > 1).then(|| Warning::ParticlesThinned { every }.to_string())
+    let (recorded, of) = (plan.content.max_particles, snapshot::drawn(plan, run.particles()).len());
+    (of > recorded).then(|| Warning::ParticlesThinned { recorded, of }.to_string())
 }

@@ -7,6 +7,7 @@ mod stresses;
 use super::initial::Unfilled;
 use super::simulation::Simulation;
 use super::yielding::Local;
+use crate::frame::thinning::evenly;
 use crate::frame::{Arrows, GridField, ParticleScalar, ParticleSnapshot, Ring, Snapshot};
 use crate::laws::director;
 use crate::motion::tracers::DyeLines;
@@ -31,11 +32,6 @@ const ARROWS: f64 = 28.0;
 const RINGS: f64 = 12.0;
 /// Levels of mean |n_x| that are drawn; the first is near 2/pi, the mean of random directors.
 const ALIGNMENT_LEVELS: [f32; 6] = [0.6, 0.5, 0.4, 0.3, 0.2, 0.1];
-
-/// The number `n` such that every `n`-th particle is drawn, for `drawn` particles in total.
-pub fn thinning(plan: &Plan, drawn: usize) -> usize {
-    drawn.div_ceil(plan.content.max_particles.max(1)).max(1)
-}
 
 /// Indices of the particles to draw: all except those of the background material.
 pub fn drawn(plan: &Plan, particles: &Particles) -> Vec<usize> {
@@ -70,20 +66,22 @@ fn moving(plan: &Plan) -> Vec<Vec<[f32; 2]>> {
 
 /// The particles to draw, without a quantity, and their indices.
 fn particles(plan: &Plan, all: &Particles) -> (ParticleSnapshot, Vec<usize>) {
+    let position = |&p: &usize| plan.si(all.position[p]).map(|c| c as f32);
     let shown = drawn(plan, all);
-    let every = thinning(plan, shown.len());
-    let shown: Vec<usize> = shown.into_iter().step_by(every).collect();
+    let places: Vec<[f32; 2]> = shown.iter().map(position).collect();
+    let kept = evenly(&places, plan.content.max_particles);
+    let each = shown.len() as f64 / kept.len().max(1) as f64;
+    let shown: Vec<usize> = kept.into_iter().map(|k| shown[k]).collect();
     let marked = plan.state.materials.len() as u16;
     let class = |&p: &usize| match &all.mark {
         Some(m) if m[p] => marked,
         _ => u16::from(all.material[p]),
     };
     let section = |p: usize| plan.mesh.section(all.volume[p], all.position[p]);
-    let position = |&p: &usize| plan.si(all.position[p]).map(|c| c as f32);
     let picture = ParticleSnapshot {
         positions: shown.iter().map(position).collect(),
         class: shown.iter().map(class).collect(),
-        radii: shown.iter().map(|&p| drawn_radius(plan, section(p) * every as f64)).collect(),
+        radii: shown.iter().map(|&p| drawn_radius(plan, section(p) * each)).collect(),
         scalar: None,
     };
     (picture, shown)
