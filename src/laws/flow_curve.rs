@@ -122,13 +122,19 @@ pub struct FlowCurve {
     pub largest: f64,
 }
 
+/// Smallest derivative of the stress with respect to the rate, in units of the smallest viscosity. Constant
+/// friction has none, and a matrix without stiffness along a shear band cannot be factored safely. A larger
+/// value makes corrections too short: with 1, those of a shear band without internal length were a twentieth of what was
+/// needed.
+const SLOPE: f64 = 0.01;
+
 /// Viscosity at a rate and a pressure, and its derivative with respect to the rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viscosity {
     /// `eta`, Pa s.
     pub value: f64,
     /// `d eta/dg`, Pa s2; zero where a bound holds, and such that the derivative of the stress is
-    /// nowhere below the smallest viscosity.
+    /// nowhere below a hundredth of the smallest viscosity.
     pub slope: f64,
 }
 
@@ -175,9 +181,8 @@ impl FlowCurve {
         } else if stress <= self.smallest * g {
             Viscosity { value: self.smallest, slope: 0.0 }
         } else {
-            // The derivative of the stress is at least the smallest viscosity.
             let value = stress / g;
-            Viscosity { value, slope: (slope.max(self.smallest) - value) / g }
+            Viscosity { value, slope: (slope.max(SLOPE * self.smallest) - value) / g }
         }
     }
 
@@ -253,7 +258,7 @@ mod tests {
                     let step = 1e-5 * g;
                     let [low, high] = [g - step, g + step].map(|g| curve.viscosity(g, p).value);
                     let slope = (high - low) / (2.0 * step);
-                    let slope = slope.max((curve.smallest - eta.value) / g);
+                    let slope = slope.max((SLOPE * curve.smallest - eta.value) / g);
                     assert!((slope / eta.slope - 1.0).abs() < 1e-6, "{curve:?} {g} {p}");
                 }
             }

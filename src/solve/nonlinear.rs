@@ -42,6 +42,9 @@ const OVERSHOOT: f64 = 1.0;
 const NEAR: f64 = 0.1;
 /// Share of the change of the pressure that the laws take from the second time on.
 const RELAXED: f64 = 0.5;
+/// Number of times from which on this share decreases as one over it, so that a pressure that goes round in a
+/// cycle comes to rest.
+const TIRED: f64 = 20.0;
 /// Largest number of corrections that remove the divergence of a converged flow.
 const MOST_PROJECTIONS: u32 = 20;
 /// Divergence, relative to the strain rate, of a converged flow.
@@ -190,7 +193,8 @@ impl<const D: usize> Stokes<D> {
             let near = report.decrement.is_some_and(|d| d <= NEAR) && updates < most_updates;
             if near {
                 // The pressure may alternate about the solution; the mean of two iterates does not.
-                let share = if updates == 0 { 1.0 } else { RELAXED };
+                let later = RELAXED * (TIRED / f64::from(updates)).min(1.0);
+                let share = if updates == 0 { 1.0 } else { later };
                 blend(&mut pressure, share, &flow.pressure);
                 let Flow { velocity, pressure } = &*flow;
                 quadrature.press(

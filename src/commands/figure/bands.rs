@@ -28,10 +28,9 @@ const SCENE: &str = include_str!("bands.toml");
 const FILE: &str = "bands.toml";
 /// Internal length, m: two cells of the coarsest mesh with an internal length.
 const INTERNAL_LENGTH: f64 = 1.0 / 16.0;
-/// Numbers of cells over the width with and without internal length; the flow without it converges
-/// slowly on fine meshes.
+/// Numbers of cells over the width with and without internal length.
 const CELLS: [u32; 3] = [32, 64, 128];
-const PLAIN_CELLS: [u32; 4] = [16, 24, 32, 64];
+const PLAIN_CELLS: [u32; 4] = [16, 32, 64, 128];
 const QUICK: [u32; 2] = [16, 32];
 /// Half of the distance across the band, and of that along it, over which the rate is averaged, m.
 const ACROSS: f64 = 0.55;
