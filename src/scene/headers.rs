@@ -44,8 +44,9 @@ impl<'a> Finder<'a> {
                 if let Some(items) = has("array").map(|form| &form["items"]) {
                     list.iter().for_each(|value| self.search(value, items, path));
                 } else if let Some(form) = has("object") {
-                    let at = list.first().map_or(value.span(), Spanned::span);
-                    let header = self.text.get(at.clone()).is_some_and(|t| t.starts_with("[["));
+                    let first = list.first().map_or(value.span(), Spanned::span);
+                    let header = self.text.get(first.clone()).is_some_and(|t| t.starts_with("[["));
+                    let at = if header { first } else { value.span() };
                     let named = form.get("additionalProperties").is_some_and(Value::is_object);
                     let remedy = match (header, named) {
                         (true, true) => format!("write `[{path}.NAME]` instead of `[[{path}]]`"),
