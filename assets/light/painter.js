@@ -204,7 +204,7 @@ function discsOf(frame, { X, Y, scale }, mirrored) {
     const rows = frame.others[k];
     const reach = rows ? Math.max((0.9 * Math.sqrt(Math.PI) * (rows + 1)) / 4 - 1, 0) : 0;
     const half = Math.ceil(reach);
-    const angle = (Math.PI / 256) * frame.across[k];
+    const angle = (Math.PI / 32) * frame.across[k];
     const step = half ? (reach / half) * radius : 0;
     const [dx, dy] = [step * Math.cos(angle), step * Math.sin(angle)];
     for (let n = -half; n <= half; n++) {

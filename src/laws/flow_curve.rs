@@ -124,8 +124,8 @@ pub struct FlowCurve {
 
 /// Smallest derivative of the stress with respect to the rate, in units of the smallest viscosity. Constant
 /// friction has none, and a matrix without stiffness along a shear band cannot be factored safely. A larger
-/// value makes corrections too short: with 1, those of a shear band without internal length were a twentieth of what was
-/// needed.
+/// value makes corrections too short: with 1, those of a shear band without internal length were a
+/// twentieth of what was needed.
 const SLOPE: f64 = 0.01;
 
 /// Viscosity at a rate and a pressure, and its derivative with respect to the rate.

@@ -28,7 +28,7 @@ const NO_VALUE: u16 = 4095;
 const RADIUS_STEPS: f32 = 8.0;
 
 /// Number of particles up to which all of a frame are packed, unless more are asked for.
-pub const MOST_PARTICLES: usize = 20_000;
+pub const MOST_PARTICLES: usize = 12_000;
 
 /// A copy of particles with at most `most` of them, evenly chosen. Radii grow so that the area
 /// stays the same.
