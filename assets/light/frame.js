@@ -31,8 +31,8 @@ const RADIUS_STEPS = 8;
 
 // The content of a frame, in metres: {count, x, y, material, radius (of each particle), others (number of
 // others in the column of a particle, see src/light/columns.rs), across (angle of the direction across the
-// column, in 32nds of half a turn), lines (flat arrays x, y, x, y, ...), strokes (x, y of both ends in turn), fields (by name), moving (outlines of
-// solids that move, as lines)}.
+// column, in 32nds of half a turn), lines (flat arrays x, y, x, y, ...), strokes (x, y of both ends in
+// turn), fields (by name), moving (outlines of solids that move, as lines)}.
 function decodeFrame(bytes, description) {
   const r = new Reader(bytes);
   const [count, lineCount, pointCount, strokeCount, fieldCount] = [r.u32(), r.u32(), r.u32(), r.u32(), r.u32()];

@@ -35,11 +35,10 @@ pub const MOST_PARTICLES: usize = 12_000;
 fn thin(particles: &ParticleSnapshot, most: usize) -> ParticleSnapshot {
     let kept = evenly(&particles.positions, most);
     let growth = (particles.positions.len() as f32 / kept.len().max(1) as f32).sqrt();
-    let of = |list: &[f32]| kept.iter().filter_map(|&k| Some(growth * list.get(k)?)).collect();
     ParticleSnapshot {
         positions: kept.iter().map(|&k| particles.positions[k]).collect(),
         class: kept.iter().filter_map(|&k| particles.class.get(k).copied()).collect(),
-        radii: of(&particles.radii),
+        radii: kept.iter().filter_map(|&k| Some(growth * particles.radii.get(k)?)).collect(),
         scalar: None,
     }
 }

@@ -95,7 +95,11 @@ impl Surface {
         let mean = radius.iter().sum::<f32>() / radius.len().max(1) as f32;
         let mut depth = vec![0f32; drawn.image.pixels().len()];
         for ((&x, &y), &r) in x.iter().zip(y).zip(radius) {
-            disc(width, ends, [x, y], r, |at, _| depth[at] = GROWTH * r.max(mean));
+            disc(width, ends, [x, y], r, |at, cover| {
+                if cover > 0.0 {
+                    depth[at] = GROWTH * r.max(mean);
+                }
+            });
         }
         // The nearest pixel of a disc, and whether its disc reaches so far when it grows.
         let pixels = drawn.image.pixels_mut();

@@ -13,6 +13,11 @@ pub fn tables_as_lists(text: &str, root: &DeTable, schema: &Value) -> Vec<SceneE
     finder.errors
 }
 
+/// What a part of the JSON schema `schema` refers to; `None` if it is no reference.
+pub fn referred<'a>(schema: &'a Value, part: &Value) -> Option<&'a Value> {
+    schema.pointer(part["$ref"].as_str()?.strip_prefix('#')?)
+}
+
 struct Finder<'a> {
     text: &'a str,
     schema: &'a Value,
@@ -65,9 +70,7 @@ impl<'a> Finder<'a> {
 
     /// The forms that a value may have: the schema itself, or the alternatives that it lists.
     fn forms(&self, schema: &'a Value) -> Vec<&'a Value> {
-        let target =
-            schema["$ref"].as_str().and_then(|r| self.schema.pointer(r.strip_prefix('#')?));
-        let schema = target.unwrap_or(schema);
+        let schema = referred(self.schema, schema).unwrap_or(schema);
         let listed = ["anyOf", "oneOf"].into_iter().filter_map(|k| schema[k].as_array()).flatten();
         let mut forms: Vec<_> = listed.flat_map(|s| self.forms(s)).collect();
         forms.push(schema);

@@ -27,7 +27,7 @@ const MAX_BYTES: usize = 1 << 20;
 const MAX_RECOVER: usize = 1 << 16;
 
 /// The JSON schema of scene files.
-static JSON_SCHEMA: LazyLock<serde_json::Value> =
+pub static JSON_SCHEMA: LazyLock<serde_json::Value> =
     LazyLock::new(|| schemars::schema_for!(Scene).to_value());
 
 /// Reads a scene file without parsing it. Directories and files that are too large, empty or not

@@ -19,8 +19,10 @@ pub mod source;
 pub mod types;
 
 pub use error::{Place, SceneError, closest};
+pub use headers::referred;
 pub use load::{
-    SCHEMA, content_hash, is_folder_name, json_schema, load, parse, scene_hash, to_toml,
+    JSON_SCHEMA, SCHEMA, content_hash, is_folder_name, json_schema, load, parse, scene_hash,
+    to_toml,
 };
 pub use quantity::{Field, FieldFn, Quantity};
 pub use scope::Scope;

@@ -44,7 +44,7 @@ const NEAR: f64 = 0.1;
 const RELAXED: f64 = 0.5;
 /// Number of times from which on this share decreases as one over it, so that a pressure that goes round in a
 /// cycle comes to rest.
-const TIRED: f64 = 20.0;
+const DAMPED_AFTER: f64 = 20.0;
 /// Largest number of corrections that remove the divergence of a converged flow.
 const MOST_PROJECTIONS: u32 = 20;
 /// Divergence, relative to the strain rate, of a converged flow.
@@ -193,8 +193,10 @@ impl<const D: usize> Stokes<D> {
             let near = report.decrement.is_some_and(|d| d <= NEAR) && updates < most_updates;
             if near {
                 // The pressure may alternate about the solution; the mean of two iterates does not.
-                let later = RELAXED * (TIRED / f64::from(updates)).min(1.0);
-                let share = if updates == 0 { 1.0 } else { later };
+                let share = match updates {
+                    0 => 1.0,
+                    n => RELAXED * (DAMPED_AFTER / f64::from(n)).min(1.0),
+                };
                 blend(&mut pressure, share, &flow.pressure);
                 let Flow { velocity, pressure } = &*flow;
                 quadrature.press(
