@@ -16,7 +16,7 @@ use crate::plan::Gauge;
 use crate::space::flow::Flow;
 use crate::space::mesh::{Axis, Mesh};
 use crate::space::particles::Particles;
-use crate::space::population::Refill;
+use crate::space::refilling::Refill;
 use crate::space::segment::{Line, Segment};
 use crate::space::shape::Shape;
 

@@ -335,7 +335,7 @@ impl<const D: usize> Simulation<D> {
         let [first_energy] = s.numbers("first_energy")?;
         let recent_energy = s.numbers("recent_energy")?;
         let flowed = s.try_numbers("flowed")?.unwrap_or_default();
-        let loosened = s.tally("loosened").unwrap_or_default();
+        let loosened = s.or_default("loosened", State::tally)?;
         let trapped_void = s.try_numbers("trapped_void")?;
         let tolerated = s.floats("tolerated")?.first().copied();
         let baseline = s.exactly("baseline", materials)?;
@@ -359,7 +359,8 @@ impl<const D: usize> Simulation<D> {
         for ((gauge, &volume), &refilled) in self.gauges.iter_mut().zip(gauges).zip(refilled) {
             (gauge.volume, gauge.refilled) = (volume, refilled);
         }
-        let recent = s.tuples("gauges.recent", 2 * self.gauges.len()).unwrap_or_default();
+        let both = 2 * self.gauges.len();
+        let recent = s.or_default("gauges.recent", |s, name| s.tuples(name, both))?;
         for (gauge, recent) in self.gauges.iter_mut().zip(recent.as_chunks().0) {
             gauge.recent = recent.map(|[all, own]| Amount { all, own });
         }

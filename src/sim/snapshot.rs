@@ -14,6 +14,7 @@ use crate::motion::tracers::DyeLines;
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName};
 use crate::space::flow::{gradient, interpolate};
+use crate::space::mesh::Mesh;
 use crate::space::outline::Outline;
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
@@ -77,21 +78,26 @@ fn particles(plan: &Plan, all: &Particles) -> (ParticleSnapshot, Vec<usize>) {
         Some(m) if m[p] => marked,
         _ => u16::from(all.material[p]),
     };
-    let section = |p: usize| plan.mesh.section(all.volume[p], all.position[p]);
+    let radius = |p: usize| drawn_radius(&plan.mesh, all.volume[p] * each, all.position[p]);
     let picture = ParticleSnapshot {
         positions: shown.iter().map(position).collect(),
         class: shown.iter().map(class).collect(),
-        radii: shown.iter().map(|&p| drawn_radius(plan, section(p) * each)).collect(),
+        radii: shown.iter().map(|&p| stepped(radius(p) * plan.units.length)).collect(),
         scalar: None,
     };
     (picture, shown)
 }
 
-/// Radius at which a particle of a section (dimensionless) is drawn (m): that of a disc of this area,
-/// in steps of 9 %, so that recordings compress well.
-fn drawn_radius(plan: &Plan, section: f64) -> f32 {
+/// Radius at which a particle of a volume at a point is drawn: that of a disc of its section `V/(2 pi r)`. Around
+/// an axis it is at most that of a ball of its volume, because the section grows without bound towards the axis.
+fn drawn_radius(mesh: &Mesh, volume: f64, at: [f64; 2]) -> f64 {
+    let disc = (mesh.section(volume, at) / PI).sqrt();
+    if mesh.measure().is_ring() { disc.min((0.75 * volume / PI).cbrt()) } else { disc }
+}
+
+/// A radius (m) in steps of 9 %, so that recordings compress well.
+fn stepped(radius: f64) -> f32 {
     const STEPS: f64 = 8.0;
-    let radius = (section / PI).sqrt() * plan.units.length;
     ((radius.log2() * STEPS).round() / STEPS).exp2() as f32
 }
 

@@ -149,6 +149,15 @@ impl State {
         values.try_into().map_err(|_| wrong_length(name, values.len(), N))
     }
 
+    /// What a column holds; the default if the run has none of this name.
+    pub(super) fn or_default<T: Default>(
+        &self,
+        name: &str,
+        read: impl FnOnce(&Self, &str) -> Result<T, StateError>,
+    ) -> Result<T, StateError> {
+        if self.columns.contains_key(name) { read(self, name) } else { Ok(T::default()) }
+    }
+
     /// A column of exactly `count` numbers.
     pub(super) fn exactly(&self, name: &str, count: usize) -> Result<&[f64], StateError> {
         let values = self.floats(name)?;

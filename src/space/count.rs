@@ -11,7 +11,7 @@ pub struct Count {
     pub held: u64,
     /// Particles that left through an open side.
     pub left: u64,
-    /// Empty cells that were refilled from a neighbour, except with the background.
+    /// Empty cells between materials that were refilled from a neighbour, except with the background.
     pub healed: u64,
     /// Volume per depth (in the plan's units) that entered through sides.
     pub volume_in: f64,

@@ -40,6 +40,7 @@ pub struct Axis {
     /// Cell at the start of each of the uniform bins over the axis.
     bins: Vec<u32>,
     bins_per_length: f64,
+    largest: f64,
 }
 
 impl Axis {
@@ -62,7 +63,8 @@ impl Axis {
             .windows(2)
             .map(|w| Span { centre: 0.5 * (w[0] + w[1]), per_length: 2.0 / (w[1] - w[0]) })
             .collect();
-        Axis { lines, periodic, spans, bins, bins_per_length }
+        let largest = lines.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        Axis { lines, periodic, spans, bins, bins_per_length, largest }
     }
 
     /// Coordinates of the mesh lines.
@@ -100,6 +102,10 @@ impl Axis {
     /// Size of a cell.
     pub fn size(&self, cell: usize) -> f64 {
         self.lines[cell + 1] - self.lines[cell]
+    }
+    /// Size of the largest cell.
+    pub fn largest(&self) -> f64 {
+        self.largest
     }
     /// Coordinate of a node.
     pub fn node_coordinate(&self, node: usize) -> f64 {

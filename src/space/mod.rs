@@ -19,6 +19,7 @@ pub mod outline_rule;
 pub mod particles;
 pub mod parts;
 pub mod population;
+pub mod refilling;
 mod relation;
 pub mod seeding;
 pub mod segment;

@@ -34,6 +34,9 @@ pub struct Particles {
 /// Largest number of particles per task.
 pub const GRAIN: usize = 4096;
 
+/// Largest reference coordinate of particles that are moved within a cell.
+const INSIDE: f64 = 0.999;
+
 /// Cell number that marks a particle for removal.
 pub const GONE: u32 = u32::MAX;
 
@@ -148,6 +151,15 @@ impl Particles {
     /// Indices of the particles of a cell; valid after [`Particles::sort`].
     pub fn of_cell(&self, cell: usize) -> std::ops::Range<usize> {
         self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize
+    }
+
+    /// Moves particle `p` of a cell to a point, or to the point of the cell nearest to it, unless a solid is there.
+    pub(super) fn move_inside(&mut self, mesh: &Mesh, cell: usize, (p, to): (usize, [f64; 2])) {
+        let r = mesh.to_reference(cell, to);
+        let to = mesh.from_reference(cell, r.map(|c| c.clamp(-INSIDE, INSIDE)));
+        if mesh.part(cell).is_none() || !mesh.is_solid_at(to) {
+            self.position[p] = to;
+        }
     }
 
     /// Appends a copy of particle `p`.

@@ -14,16 +14,16 @@
 //!   interface of several materials, and the fields that particles carry, are known from them;
 //! - too few only below `n/4` if it and its neighbours hold one material whose particles carry
 //!   nothing: there the particles only transport the material to the next interface;
+//! - in the strips of small cells that a mesh refined in one direction has, too few only below a quarter of these
+//!   numbers at interfaces, and amid one material below the part of the area; where a mesh is refined in both
+//!   directions, cells need as many as large ones;
 //! - in the cells at an axis too few below `n/2`, since rings that shrink move apart in the section;
 //! - too many above `3 n + 4`.
 //!
-//! Through the fine cells of a graded mesh, the particles of coarse cells are split and merged
-//! again. In the default silo, whose cells at the lips are a twelfth of the others, seven of ten of the
-//! 53,000 splits keep `n/4` particles in cells amid one material. With one particle there, 19,600
-//! splits and 22,400 merges remain, but 3,600 cells have to be refilled, the flow changes faster (166
-//! steps instead of 153), and the outflow is 0.7 % smaller. A grading of 5 instead of 12 needs 14,200
-//! splits and 5,100 merges; the discharge at the start is then 0.57 % below its limit instead of
-//! 0.23 %.
+//! The particles of large cells would otherwise be split in these strips, and merged again behind them. The default
+//! silo, whose cells at the lips are a twelfth of the others, needs 15,400 splits and 12,800 merges; with the numbers
+//! of large cells in all cells it would need 45,000 and 24,000. Where the mesh is refined in both directions, fewer
+//! particles would make the flow jump: the outflow changes by 3 % when grains enter or leave the cell below a lip.
 //!
 //! Of choices that are equal up to rounding, the one nearest to the centre of the domain is taken,
 //! so that mirror images are treated alike. Otherwise a symmetric jet is deflected: that of the
@@ -35,6 +35,7 @@ use super::merging::Merging;
 use super::mesh::Mesh;
 use super::neighbours::Neighbours;
 use super::particles::Particles;
+use super::refilling::{self, Refill};
 use super::seeding::Seeding;
 use super::ties::{SAME, cheapest, from_middle};
 use super::walls::Enclosure;
@@ -46,20 +47,14 @@ use crate::threads;
 /// 0.91 with this one (with random positions they would deviate by 0.8).
 const SPLIT: f64 = 0.7;
 
+/// Smallest fraction of the numbers of particles that a cell at an interface needs, however small it is.
+const LEAST_AT_INTERFACE: f64 = 0.25;
+
+/// Fraction of the numbers of particles from which on each quadrant needs one.
+const WITH_QUADRANTS: f64 = 0.5;
+
 /// Largest number of cells per task.
 const GRAIN: usize = 256;
-
-/// Largest reference coordinate of shifted particles.
-const INSIDE: f64 = 0.999;
-
-/// Volume per depth (in the plan's units) of a material that was moved into an empty cell.
-#[derive(Clone, Copy, Debug)]
-pub struct Refill {
-    /// The cell that gave it and the cell that received it; they share a face.
-    pub cells: [usize; 2],
-    pub material: u8,
-    pub volume: f64,
-}
 
 /// What fills cells without particles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -174,13 +169,12 @@ impl Population {
         let Surrounding::Material(background) = self.around else { return false };
         let mut added = std::mem::take(&mut self.room.added);
         added.clear();
-        for cell in (0..mesh.cells()).filter(|&c| !mesh.solid[c]) {
-            if particles.of_cell(cell).is_empty() {
-                let Some(refill) = self.heal(mesh, particles, cell) else { continue };
-                count.healed += u64::from(Some(refill.material) != background);
-                self.refills.push(refill);
-                added.push(cell as u32);
-            }
+        for cell in refilling::empty_cells(mesh, particles) {
+            let refill = refilling::refill(mesh, &self.neighbours, particles, cell);
+            let Some(refill) = refill else { continue };
+            count.healed += u64::from(!refill.amid && Some(refill.material) != background);
+            self.refills.push(refill);
+            added.push(cell as u32);
         }
         let any = !added.is_empty();
         if any {
@@ -220,10 +214,19 @@ impl Population {
         let own = particles.of_cell(cell);
         let around = self.neighbours.of(cell).flat_map(|n| particles.of_cell(n));
         let first = particles.material[own.start];
-        if !carries && own.chain(around).all(|p| particles.material[p] == first) {
-            Need { least: (self.target() / 4).max(1), quadrants: false }
-        } else {
+        let [area, corner] = size_factors(mesh, cell);
+        let of_part = |part: f64, number: usize| ((part * number as f64).ceil() as usize).max(1);
+        if carries {
             self.largest_need()
+        } else if own.chain(around).all(|p| particles.material[p] == first) {
+            // A cell beside an empty one has to give it particles.
+            let beside_empty = self.neighbours.of(cell).any(is_empty);
+            let part = if beside_empty { 1.0 } else { area.max(corner) };
+            Need { least: of_part(part, self.target() / 4), quadrants: false }
+        } else {
+            let Need { least, quadrants } = self.largest_need();
+            let part = corner.max(LEAST_AT_INTERFACE);
+            Need { least: of_part(part, least), quadrants: quadrants && part >= WITH_QUADRANTS }
         }
     }
 
@@ -259,28 +262,15 @@ impl Population {
         let lattice = lattice.filter(|g| !mesh.is_solid_in(cell, mesh.from_reference(cell, *g)));
         cheapest(lattice.map(|g| (-clearance(&g), g)), middle)
     }
+}
 
-    /// Refills an empty cell with half of the largest particle of its neighbours, if possible one that is not
-    /// behind a solid. `None` if they have none, or if the free part of the cell is too small to hold one.
-    fn heal(&self, mesh: &Mesh, particles: &mut Particles, cell: usize) -> Option<Refill> {
-        let place = match mesh.part(cell) {
-            Some(part) => mesh.free_place(cell, part)?,
-            None => mesh.cell_centre(cell),
-        };
-        let near = self.neighbours.of(cell).flat_map(|n| particles.of_cell(n).map(move |p| (n, p)));
-        let offers = near.map(|(n, p)| {
-            let seen = mesh.sees(place, particles.position[p]);
-            (if seen { -particles.volume[p] } else { 0.0 }, (n, p))
-        });
-        let middle = |&(_, p): &(usize, usize)| from_middle(mesh, particles.position[p]);
-        let (from, donor) = cheapest(offers, middle)?;
-        particles.volume[donor] *= 0.5;
-        particles.duplicate(donor);
-        let child = particles.len() - 1;
-        particles.position[child] = place;
-        let (material, volume) = (particles.material[child], particles.volume[child]);
-        Some(Refill { cells: [from, cell], material, volume })
-    }
+/// Area of a cell over that of the largest, and the square of its aspect ratio if its sides are measured in those of
+/// the largest: 1 at the places towards which a mesh is refined, where the flow is sensitive to the interface, and
+/// less in the strips of small cells that its lines make elsewhere.
+fn size_factors(mesh: &Mesh, cell: usize) -> [f64; 2] {
+    let size = mesh.cell_size(cell);
+    let [a, b] = [size[0] / mesh.x.largest(), size[1] / mesh.y.largest()];
+    [a * b, (a / b).min(b / a).powi(2)]
 }
 
 /// Whether a cell has fewer particles than a need.
@@ -349,11 +339,7 @@ fn keep_centroid(
         [0, 1].map(|c| share * (particles.position[parent][c] - particles.position[child][c]));
     for &p in kin {
         let [x, y] = particles.position[p];
-        let r = mesh.to_reference(cell, [x + shift[0], y + shift[1]]);
-        let to = mesh.from_reference(cell, r.map(|c| c.clamp(-INSIDE, INSIDE)));
-        if mesh.part(cell).is_none() || !mesh.is_solid_at(to) {
-            particles.position[p] = to;
-        }
+        particles.move_inside(mesh, cell, (p, [x + shift[0], y + shift[1]]));
     }
 }
 

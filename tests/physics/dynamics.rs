@@ -76,22 +76,34 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
     }
 }
 
-/// While the grains run out, single particles of the background pass the aperture with them. The rate
+/// While the grains run out, single particles of the background pass the aperture with them. Their rate
 /// changes at most three times as fast as the dissipation, except for what the flux of all materials
-/// changes by itself: up to 2.6 % in one step at 6 cells, in which the dissipation changes by 0.4 %.
+/// changes by itself: by up to 3 % in one step in which the dissipation changes by 0.2 %, when grains enter or leave
+/// the small cell below a lip.
 #[test]
 fn the_rate_of_a_gauge_changes_no_faster_than_the_flow() {
     for cells in ["accuracy.cells=4", "accuracy.cells=6"] {
-        let mut run = preset("silo", &[cells, "recording.times=[]"]);
+        let text = std::fs::read_to_string("presets/silo.toml").unwrap();
+        let other = "[[gauges]]\nname = \"air\"\nfrom = [\"-aperture/2\", \"3*aperture\"]\n\
+                     to = [\"aperture/2\", \"3*aperture\"]\ndirection = \"down\"\n\
+                     material = \"background\"\n";
+        let mut run = scene(&format!("{text}\n{other}"), &[cells, "recording.times=[]"]);
         let mut before = None;
         finish(run.as_mut(), |run| {
             let row = run.row();
-            let now = [row.gauges[0].rate, row.dissipation];
+            let [grains, air] = [0, 1].map(|k| row.gauges[k].rate);
+            let now = [grains, grains + air, row.dissipation];
             if let Some(before) = before.replace(now) {
-                let [rate, dissipation] = [0, 1].map(|k| (now[k] / before[k] - 1.0).abs());
+                let [rate, all, dissipation] =
+                    [0, 1, 2].map(|k: usize| (now[k] / before[k] - 1.0).abs());
                 assert!(
-                    rate < 3.0 * dissipation + 0.015,
-                    "{cells}, t = {}: {rate} of the rate, {dissipation} of the dissipation",
+                    rate < all.max(3.0 * dissipation) + 5e-3,
+                    "{cells}, t = {}: {rate} of the rate, {all} of all, {dissipation} of the dissipation",
+                    row.time
+                );
+                assert!(
+                    all < 3.0 * dissipation + 0.04,
+                    "{cells}, t = {}: {all} of all, {dissipation} of the dissipation",
                     row.time
                 );
             }
