@@ -1,6 +1,7 @@
 //! This module makes the snapshot of a state for the recording: particles, dye lines, director
 //! glyphs, fields, arrows and isolines, in SI units.
 
+mod discs;
 mod raster;
 mod stresses;
 
@@ -14,13 +15,12 @@ use crate::motion::tracers::DyeLines;
 use crate::plan::Plan;
 use crate::scene::{ColourBy, FieldName};
 use crate::space::flow::{gradient, interpolate};
-use crate::space::mesh::Mesh;
 use crate::space::outline::Outline;
 use crate::space::particles::Particles;
 use crate::space::shape::Shape;
 use crate::threads;
+use discs::{drawn_radius, stepped};
 use raster::{Coarse, Raster, isoline, range, symmetric};
-use std::f64::consts::PI;
 
 /// Number of field samples in a parallel task.
 const SAMPLE_GRAIN: usize = 2048;
@@ -86,19 +86,6 @@ fn particles(plan: &Plan, all: &Particles) -> (ParticleSnapshot, Vec<usize>) {
         scalar: None,
     };
     (picture, shown)
-}
-
-/// Radius at which a particle of a volume at a point is drawn: that of a disc of its section `V/(2 pi r)`. Around
-/// an axis it is at most that of a ball of its volume, because the section grows without bound towards the axis.
-fn drawn_radius(mesh: &Mesh, volume: f64, at: [f64; 2]) -> f64 {
-    let disc = (mesh.section(volume, at) / PI).sqrt();
-    if mesh.measure().is_ring() { disc.min((0.75 * volume / PI).cbrt()) } else { disc }
-}
-
-/// A radius (m) in steps of 9 %, so that recordings compress well.
-fn stepped(radius: f64) -> f32 {
-    const STEPS: f64 = 8.0;
-    ((radius.log2() * STEPS).round() / STEPS).exp2() as f32
 }
 
 /// Dye lines as polylines (m).

@@ -15,13 +15,13 @@
 //! - too few only below `n/4` if it and its neighbours hold one material whose particles carry
 //!   nothing: there the particles only transport the material to the next interface;
 //! - in the strips of small cells that a mesh refined in one direction has, too few only below a quarter of these
-//!   numbers at interfaces, and amid one material below the part of the area; where a mesh is refined in both
-//!   directions, cells need as many as large ones;
+//!   numbers if a neighbour holds another material, and amid one material below the part of the area; where a mesh is
+//!   refined in both directions, cells need as many as large ones;
 //! - in the cells at an axis too few below `n/2`, since rings that shrink move apart in the section;
 //! - too many above `3 n + 4`.
 //!
 //! The particles of large cells would otherwise be split in these strips, and merged again behind them. The default
-//! silo, whose cells at the lips are a twelfth of the others, needs 15,400 splits and 12,800 merges; with the numbers
+//! silo, whose cells at the lips are a twelfth of the others, needs 17,600 splits and 13,600 merges; with the numbers
 //! of large cells in all cells it would need 45,000 and 24,000. Where the mesh is refined in both directions, fewer
 //! particles would make the flow jump: the outflow changes by 3 % when grains enter or leave the cell below a lip.
 //!
@@ -47,8 +47,8 @@ use crate::threads;
 /// 0.91 with this one (with random positions they would deviate by 0.8).
 const SPLIT: f64 = 0.7;
 
-/// Smallest fraction of the numbers of particles that a cell at an interface needs, however small it is.
-const LEAST_AT_INTERFACE: f64 = 0.25;
+/// Smallest fraction of the numbers of particles that a cell beside another material needs, however small it is.
+const LEAST_BESIDE: f64 = 0.25;
 
 /// Fraction of the numbers of particles from which on each quadrant needs one.
 const WITH_QUADRANTS: f64 = 0.5;
@@ -216,7 +216,7 @@ impl Population {
         let first = particles.material[own.start];
         let [area, corner] = size_factors(mesh, cell);
         let of_part = |part: f64, number: usize| ((part * number as f64).ceil() as usize).max(1);
-        if carries {
+        if carries || own.clone().any(|p| particles.material[p] != first) {
             self.largest_need()
         } else if own.chain(around).all(|p| particles.material[p] == first) {
             // A cell beside an empty one has to give it particles.
@@ -225,7 +225,7 @@ impl Population {
             Need { least: of_part(part, self.target() / 4), quadrants: false }
         } else {
             let Need { least, quadrants } = self.largest_need();
-            let part = corner.max(LEAST_AT_INTERFACE);
+            let part = corner.max(LEAST_BESIDE);
             Need { least: of_part(part, least), quadrants: quadrants && part >= WITH_QUADRANTS }
         }
     }

@@ -70,3 +70,56 @@ pub(super) fn refill(
     }
     Some(Refill { cells: [from, cell], material, volume: particles.volume[child], amid })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::mesh::Axis;
+    use crate::space::walls::Enclosure;
+
+    /// Four by three cells, of which those in the middle row hold a particle each.
+    fn start(material: impl Fn([f64; 2]) -> u8) -> (Mesh, Neighbours, Particles) {
+        let axis = |lines: &[f64]| Axis::new(lines.to_vec(), false);
+        let mesh = Mesh::new(axis(&[0.0, 1.0, 2.0, 3.0, 4.0]), axis(&[0.0, 1.0, 2.0, 3.0]));
+        let neighbours = Neighbours::new(&mesh, &Enclosure::default());
+        let mut particles = Particles::default();
+        for (x, y) in [(0.4, 1.3), (1.3, 1.2), (2.7, 1.2), (3.6, 1.3)] {
+            particles.push([x, y], 1.0, material([x, y]));
+        }
+        particles.sort(&mesh);
+        (mesh, neighbours, particles)
+    }
+
+    fn moments(particles: &Particles) -> [f64; 3] {
+        let each = particles.position.iter().zip(&particles.volume);
+        each.fold([0.0; 3], |m, (p, v)| [m[0] + v, m[1] + v * p[0], m[2] + v * p[1]])
+    }
+
+    #[test]
+    fn amid_one_material_no_material_is_moved() {
+        let (mesh, neighbours, mut particles) = start(|_| 0);
+        let before = moments(&particles);
+        for cell in 0..4 {
+            let refill = refill(&mesh, &neighbours, &mut particles, cell).unwrap();
+            assert!(refill.amid);
+        }
+        let after = moments(&particles);
+        for (a, b) in before.iter().zip(after) {
+            assert!((a - b).abs() < 1e-14, "{before:?} {after:?}");
+        }
+    }
+
+    #[test]
+    fn mirror_images_are_refilled_alike() {
+        let (mesh, neighbours, mut particles) = start(|p| u8::from(p[0] > 1.0 && p[0] < 3.0));
+        for cell in empty_cells(&mesh, &particles) {
+            refill(&mesh, &neighbours, &mut particles, cell);
+        }
+        for (p, v) in particles.position.iter().zip(&particles.volume) {
+            let image = particles.position.iter().zip(&particles.volume).find(|(q, w)| {
+                (p[0] + q[0] - 4.0).abs() < 1e-12 && (p[1] - q[1]).abs() < 1e-12 && v == *w
+            });
+            assert!(image.is_some(), "{p:?}");
+        }
+    }
+}

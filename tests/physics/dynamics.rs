@@ -76,10 +76,10 @@ fn the_silo_loses_the_energy_it_dissipates_and_keeps_its_volume() {
     }
 }
 
-/// While the grains run out, single particles of the background pass the aperture with them. Their rate
-/// changes at most three times as fast as the dissipation, except for what the flux of all materials
-/// changes by itself: by up to 3 % in one step in which the dissipation changes by 0.2 %, when grains enter or leave
-/// the small cell below a lip.
+/// The rate of grains changes at most three times as fast as the dissipation, with two exceptions. The flux of all
+/// materials changes by up to 3 % in a step in which the dissipation changes by 0.2 %, when grains enter or leave
+/// the small cell below a lip. While the grains run out, single particles of the background pass the aperture with
+/// them, each of which changes the rate by about 1 %.
 #[test]
 fn the_rate_of_a_gauge_changes_no_faster_than_the_flow() {
     for cells in ["accuracy.cells=4", "accuracy.cells=6"] {
@@ -97,7 +97,7 @@ fn the_rate_of_a_gauge_changes_no_faster_than_the_flow() {
                 let [rate, all, dissipation] =
                     [0, 1, 2].map(|k: usize| (now[k] / before[k] - 1.0).abs());
                 assert!(
-                    rate < all.max(3.0 * dissipation) + 5e-3,
+                    rate < all.max(3.0 * dissipation) + 0.015,
                     "{cells}, t = {}: {rate} of the rate, {all} of all, {dissipation} of the dissipation",
                     row.time
                 );
@@ -108,6 +108,23 @@ fn the_rate_of_a_gauge_changes_no_faster_than_the_flow() {
                 );
             }
         });
+    }
+}
+
+/// Particles are split, merged and moved into empty cells alike on both sides of the axis; otherwise the jet folds.
+#[test]
+fn a_symmetric_jet_stays_symmetric() {
+    for growth in ["mesh.growth=1.75", "mesh.growth=2"] {
+        let sets = ["accuracy.cells=6", growth, "time.end=1e-3", "recording.times=[]"];
+        let mut run = preset("silo", &sets);
+        finish(run.as_mut(), |_| ());
+        let particles = run.particles();
+        let moment: f64 = (0..particles.len())
+            .filter(|&p| particles.material[p] == 0)
+            .map(|p| particles.position[p][0] * particles.volume[p])
+            .sum();
+        let centre = moment / particles.volume_of(0);
+        assert!(centre.abs() < 1e-7, "{growth}: the centroid of the grains is at x = {centre}");
     }
 }
 
