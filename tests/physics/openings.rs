@@ -103,16 +103,22 @@ fn particles_leave_only_through_the_slit_and_the_background_takes_their_place() 
     // Later the surface reaches the slit.
     let mut run = scene(SLIT, &["accuracy.cells=6", "time.end=20"]);
     let start = [volume(&*run, "fluid"), volume(&*run, "air")];
+    // Of the 100 steps.
+    let mut mean = 0.0;
     while !run.is_finished() {
         run.step().unwrap();
         let [fluid, air] = [volume(&*run, "fluid"), volume(&*run, "air")];
         let [slit, air_out, air_in] = [0, 1, 2].map(|k| run.row().gauges[k].volume);
         assert!((start[0] - slit - fluid).abs() < 1e-11, "{fluid} {slit}");
         assert!((start[1] + air_in - air_out - air).abs() < 1e-11, "{air} {air_in} {air_out}");
-        // The particles fill the domain up to a few particles at the slit: the difference is at most
-        // 0.019, and does not grow.
-        assert!((fluid + air - 4.0).abs() < 0.03, "{fluid} {air}");
+        // The particles fill the domain up to a row of them at the slit: the difference is at most that of ten
+        // particles, 0.031, and does not grow.
+        let particle = 1.0 / (6.0 * 6.0 * 9.0);
+        let excess = fluid + air - 4.0;
+        assert!(excess.abs() < 12.0 * particle, "{fluid} {air}");
+        mean += excess / 100.0;
     }
+    assert!(mean.abs() < 3e-3, "{mean}");
     let slit = run.row().gauges[0].volume;
     let plan = run.plan();
     let air = plan.background().unwrap();
