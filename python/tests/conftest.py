@@ -8,7 +8,7 @@ import pytest
 
 import grainscope
 
-COARSE: dict[str, grainscope.Setting] = {"accuracy.cells": 1, "recording.frames": 10}
+COARSE: dict[str, grainscope.Setting] = {"accuracy.cells": 2, "recording.frames": 10}
 SHORT: dict[str, grainscope.Setting] = {
     "accuracy.cells": 1,
     "recording.frames": 2,
