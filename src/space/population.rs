@@ -211,14 +211,14 @@ impl Population {
         let carries = particles.director.is_some()
             || particles.viscosity.is_some()
             || particles.density.is_some();
-        let own = particles.of_cell(cell);
-        let around = self.neighbours.of(cell).flat_map(|n| particles.of_cell(n));
+        let mut own = particles.of_cell(cell);
+        let mut around = self.neighbours.of(cell).flat_map(|n| particles.of_cell(n));
         let first = particles.material[own.start];
         let [area, corner] = size_factors(mesh, cell);
         let of_part = |part: f64, number: usize| ((part * number as f64).ceil() as usize).max(1);
-        if carries || own.clone().any(|p| particles.material[p] != first) {
+        if carries || own.any(|p| particles.material[p] != first) {
             self.largest_need()
-        } else if own.chain(around).all(|p| particles.material[p] == first) {
+        } else if around.all(|p| particles.material[p] == first) {
             // A cell beside an empty one has to give it particles.
             let beside_empty = self.neighbours.of(cell).any(is_empty);
             let part = if beside_empty { 1.0 } else { area.max(corner) };

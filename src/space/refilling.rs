@@ -13,7 +13,7 @@ use super::ties::{cheapest, from_middle};
 /// particles would be more unequal, with more the donor would move farther.
 const GIVEN_AMID: f64 = 0.25;
 
-/// Volume per depth (in the plan's units) of a material that was moved into an empty cell.
+/// What an empty cell was given: a volume per depth (in the plan's units) of a material.
 #[derive(Clone, Copy, Debug)]
 pub struct Refill {
     /// The cell that gave it and the cell that received it; they share a face.

@@ -49,7 +49,7 @@ pub(super) fn mesh(
         return Err(SceneError::of_key(
             "mesh.growth",
             format!("mesh.growth is {growth}"),
-            "neighbouring cells may differ by a ratio above 1, at most 2; 1.5 is usual",
+            "neighbouring cells may differ by a ratio above 1, at most 2; 1.75 is usual",
         ));
     }
     let mut lines: [Vec<Line>; 2] = [vec![], vec![]];
