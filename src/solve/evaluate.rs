@@ -99,27 +99,34 @@ impl Evaluation<'_> {
         scratch.fit_viscosities();
         let form = match self.rule {
             // The arrangement next to a solid is not known.
-            _ if self.mesh.part(cell).is_some() => Form::Film,
+            _ if self.mesh.part(cell).is_some() => Form::Even,
             Rule::Laminate | Rule::Sides => self.form(cell, scratch),
             Rule::Mixture | Rule::Particles => Form::Mixture,
         };
         let mixture = match form {
             Form::Drops { around } => Mixture::around_drops(around),
-            Form::Sides { .. } | Form::Film | Form::Weights => Mixture::parallel(),
+            Form::Sides { .. } | Form::Film { .. } | Form::Even | Form::Weights => {
+                Mixture::parallel()
+            }
             Form::Cut { .. } | Form::Mixture => Mixture::default(),
         };
         scratch.match_volumes(self.factors);
         // Where the stress is not the sum of those of the materials, its derivative is left out.
         let softened = match &form {
             Form::Sides { cut, .. } => 1.0 - cut.trust,
-            Form::Film | Form::Weights => 1.0,
+            Form::Film { .. } | Form::Even | Form::Weights => 1.0,
             Form::Mixture if scratch.is_of_one_material() => 1.0,
             Form::Cut { .. } | Form::Drops { .. } | Form::Mixture => 0.0,
         };
-        let even = matches!(form, Form::Film) || void.is_some();
+        let alone = match form {
+            Form::Sides { alone, .. } => alone,
+            Form::Film { alone } => Some(alone),
+            _ => None,
+        };
+        let even = matches!(form, Form::Film { .. } | Form::Even) || void.is_some();
         let shares =
             |m: usize, g: usize| if even { scratch.mean_share(m) } else { scratch.share(m, g) };
-        self.points(cell, out, (scratch, &shares), (mixture, softened));
+        self.points(cell, out, (scratch, &shares, alone), (mixture, softened));
         let cut = match form {
             Form::Cut { interface, between } => {
                 let cut = self.laminate(cell, &interface, between, scratch);
@@ -131,8 +138,8 @@ impl Evaluation<'_> {
                     cut.rest * *out.mean_viscosity + (1.0 - cut.rest) * arithmetic;
                 cut
             }
-            Form::Sides { cut, between } => self.sides(cell, cut, between, (scratch, out)),
-            Form::Film | Form::Weights | Form::Drops { .. } | Form::Mixture => match void {
+            Form::Sides { cut, between, .. } => self.sides(cell, cut, between, (scratch, out)),
+            _ => match void {
                 Some(void) => self.spread(cell, 1.0 - void.share),
                 None => return,
             },
@@ -232,18 +239,19 @@ impl Evaluation<'_> {
         scratch.volumes().iter().zip(self.materials).map(|(v, m)| v / total * m.viscosity).sum()
     }
 
-    /// Fills the nine points of a cell, its volume fractions and its means. `softened`: the part of
-    /// the derivatives of the viscosities that the points have.
+    /// Fills the nine points of a cell, its volume fractions and its means. `only`: the material whose
+    /// law is that of the cell, if the others have volume only. `softened`: the part of the
+    /// derivatives of the viscosities that the points have.
     fn points(
         &self,
         cell: usize,
         out: &mut CellMut,
-        (scratch, share): (&Gathered, &dyn Fn(usize, usize) -> f64),
+        (scratch, share, only): (&Gathered, &dyn Fn(usize, usize) -> f64, Option<usize>),
         (empty, softened): (Mixture, f64),
     ) {
         out.fractions.fill(0.0);
         (*out.mean_viscosity, *out.compliance) = (0.0, 0.0);
-        let alone = scratch.is_of_one_material();
+        let alone = only.is_some() || scratch.is_of_one_material();
         for g in 0..9 {
             let IntegrationPoint { r, weight, .. } = out.points[g];
             let mut mixture = empty;
@@ -252,15 +260,15 @@ impl Evaluation<'_> {
                 if phi == 0.0 {
                     continue;
                 }
-                if self.fill.is_some_and(|fill| fill.void() == m) {
-                    out.fractions[m] += weight * phi;
+                out.fractions[m] += weight * phi;
+                if self.fill.is_some_and(|fill| fill.void() == m) || only.is_some_and(|o| o != m) {
                     continue;
                 }
+                let phi = if only.is_some() { 1.0 } else { phi };
                 let eta = self.viscosity(m, r, scratch);
                 let here = self.here((cell, r), m, eta, scratch.orientation(m, g));
                 let (law, softening) = material.law.with_softening(&here);
                 mixture.add(phi, &law);
-                out.fractions[m] += weight * phi;
                 *out.compliance += weight * phi * material.law.compliance;
                 if softened > 0.0 {
                     let place = self.place(cell, g, r);

@@ -16,7 +16,7 @@
 //! sqrt(s(0) / dissipation)        (Newton decrement, relative)
 //! ```
 //! is below the tolerance (or the first one after the laws have taken the pressure for the last
-//! time): an estimate of the relative error before that correction. It does not
+//! time), if the powers balance too: an estimate of the relative error before that correction. It does not
 //! depend on units, on the mesh, or on the contrast of viscosities.
 
 use super::last_flow::Iterate;
@@ -51,12 +51,6 @@ const MOST_PROJECTIONS: u32 = 20;
 const DIVERGENCE: f64 = 1e-8;
 /// Dissipation below this share of the scale of power is that of a scene at rest.
 const REST: f64 = 1e-9;
-
-/// Largest error of the balance of powers of a converged flow along walls with friction, in units of the
-/// tolerance. In a deep column of grains that descends, the decrement reaches 1e-2 with errors of 1e-2.
-const FRICTION_POWER: f64 = 1e-3;
-/// The same at the smallest tolerances.
-const ROUNDING: f64 = 1e-9;
 
 /// Largest number of times that the laws take a new pressure in a step; from then on they keep it, so that
 /// a pressure that alternates does not prevent convergence. With one time only, grains above a round
@@ -220,12 +214,7 @@ impl<const D: usize> Stokes<D> {
                 quadrature.turn(share);
             }
             self.report(&work.residual, loads, flow, report)?;
-            let mut converged = report.decrement.is_some_and(|d| d <= stopping.nonlinear);
-            // The decrement does not tell whether friction holds a body that hardly deforms.
-            if quadrature.has_wall_friction() {
-                let most = (FRICTION_POWER * stopping.nonlinear).max(ROUNDING);
-                converged &= report.power_error() <= most;
-            }
+            let converged = report.has_converged(stopping, quadrature.has_wall_friction());
             report.seconds.solve += clock.elapsed().as_secs_f64();
             if converged && current {
                 return self.remove_divergence(quadrature, loads, (flow, report, work));

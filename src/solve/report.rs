@@ -7,6 +7,18 @@ use crate::words::count;
 /// Powers below this fraction of [`Report::power_scale`] are rounding errors of a scene at rest.
 const REST: f64 = 1e-6;
 
+/// Largest error of the balance of powers of a converged flow of generalised fluids, in units of the
+/// tolerance.
+const POWER: f64 = 0.5;
+/// Decrement, in units of the tolerance, at which the balance is not asked for.
+const SURE: f64 = 0.1;
+/// The error of the balance along walls with friction, whatever the decrement. It does not tell whether friction
+/// holds a body that hardly deforms: in a deep column of grains that descends, the decrement reaches 1e-2
+/// with errors of 1e-2.
+const FRICTION_POWER: f64 = 1e-3;
+/// The same at the smallest tolerances.
+const ROUNDING: f64 = 1e-9;
+
 /// Stopping criteria of the corrections.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopping {
@@ -70,16 +82,26 @@ impl Report {
     /// Imbalance of the powers relative to the largest of them, or to a millionth of the power
     /// scale if that is larger.
     pub fn power_error(&self) -> f64 {
-        let larger = [
-            self.power_in,
-            self.dissipation,
-            self.restoring,
-            self.inertia,
-            REST * self.power_scale,
-        ];
-        let larger = larger.iter().fold(0.0, |a: f64, p| a.max(p.abs()));
+        let powers = [self.power_in, self.dissipation, self.restoring, self.inertia];
+        self.imbalance(powers.iter().fold(0.0, |a: f64, p| a.max(p.abs())))
+    }
+
+    /// Imbalance of the powers relative to a power, or to a millionth of the power scale if that is larger.
+    fn imbalance(&self, power: f64) -> f64 {
+        let larger = power.max(REST * self.power_scale);
         let difference = (self.power_in - self.dissipation - self.restoring - self.inertia).abs();
         if larger > 0.0 { difference / larger } else { 0.0 }
+    }
+
+    /// Whether the iteration for generalised fluids has converged. With inertia, the momentum is a load, whose
+    /// power may be far larger than the dissipation, to which errors are relative here.
+    pub(super) fn has_converged(&self, stopping: Stopping, wall_friction: bool) -> bool {
+        let tolerance = stopping.nonlinear;
+        let Some(decrement) = self.decrement.filter(|d| *d <= tolerance) else { return false };
+        let balanced = self.imbalance(self.dissipation) <= POWER * tolerance;
+        let rubs = (FRICTION_POWER * tolerance).max(ROUNDING);
+        (balanced || decrement <= SURE * tolerance)
+            && (!wall_friction || self.power_error() <= rubs)
     }
 }
 

@@ -15,6 +15,7 @@ mod layers;
 mod rayleigh_taylor;
 mod report;
 mod rest;
+mod slits;
 mod smooth;
 mod solids;
 mod texture;
@@ -47,7 +48,7 @@ impl Effort {
 type Subject = fn(Effort) -> Result<Section, CaseError>;
 
 /// All subjects: name on the command line, and function.
-pub const SUBJECTS: [(&str, Subject); 14] = [
+pub const SUBJECTS: [(&str, Subject); 15] = [
     ("elements", elements::section),
     ("smooth", smooth::section),
     ("cut-cells", cut_cells::section),
@@ -60,6 +61,7 @@ pub const SUBJECTS: [(&str, Subject); 14] = [
     ("texture", texture::section),
     ("flow-curves", flow_curves::section),
     ("inertia", inertia::section),
+    ("slits", slits::section),
     ("solids", solids::section),
     ("axisymmetric", axisymmetric::section),
 ];

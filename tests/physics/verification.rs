@@ -62,6 +62,10 @@ fn inertia() {
     check("inertia");
 }
 #[test]
+fn slits() {
+    check("slits");
+}
+#[test]
 fn solids() {
     check("solids");
 }
