@@ -9,7 +9,8 @@
 //! ```text
 //! s(a) = r(u + a du) . du = -dF/da,   s(0) = du . J du > 0
 //! ```
-//! The whole step is taken unless it goes too far (`s(1) < 0` and large). Then the laws take the new
+//! The whole step is taken unless it goes too far (`s(1) < 0` and large), and also if `s(0) <= 0`, since it
+//! then removes the divergence that an earlier flow had in cells of other shapes. Then the laws take the new
 //! pressure. The iteration ends with the correction whose norm, that of the dissipated power,
 //!
 //! ```text
@@ -344,8 +345,10 @@ impl<const D: usize> Stokes<D> {
             }
             self.residual(quadrature, loads, along, work);
             let here = self.slope(work);
-            if here >= -OVERSHOOT * slope.abs() && (share == 1.0 || here <= OVERSHOOT * slope.abs())
-            {
+            let fits = here >= -OVERSHOOT * slope.abs()
+                && (share == 1.0 || here <= OVERSHOOT * slope.abs());
+            // Where the functional does not fall along it, the correction removes a divergence.
+            if fits || slope <= 0.0 {
                 return (share, true);
             }
             if here < 0.0 || here.is_nan() {

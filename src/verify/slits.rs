@@ -97,7 +97,7 @@ fn grains(effort: Effort, out: &mut Section) -> Result<(), CaseError> {
                 let what = format!(
                     "grains of {diameter} m, slit of {aperture} m: change of the last halving"
                 );
-                out.check(what, (last / before - 1.0).abs(), Bound::AtMost(0.015));
+                out.check(what, (last / before - 1.0).abs(), Bound::AtMost(0.02));
             }
             finest.extend(rates.last().copied());
         }
