@@ -37,6 +37,7 @@ impl<const D: usize> Simulation<D> {
             || self.matter.materials.iter().any(|m| m.law.depends_on().needs_flow());
         let known = !nonlinear || velocity.as_flattened().iter().any(|&u| u != 0.0);
         let last: &dyn LastFlow = if known { &last } else { &NoFlow };
+        self.quadrature.set_gravity(self.matter.gravity);
         self.quadrature
             .update(&plan.mesh, &self.particles, &self.matter.materials, self.version, last)
             .map_err(|mut source| {

@@ -223,7 +223,7 @@ impl Evaluation<'_> {
             (sides::varying(&cut, &laws, measure), None)
         } else {
             let laws = with_void(between.map(|m| self.law_at_centre(cell, m, scratch)));
-            let ramp = Ramp::new(self.walls[cell].any).filter(|_| void.is_none());
+            let ramp = Ramp::new(self.walls.sides[cell].any).filter(|_| void.is_none());
             sides::matrix(&cut, &laws, measure, ramp)
         };
         matrix.iter_mut().flatten().for_each(|k| *k *= cut.trust);

@@ -100,7 +100,8 @@ impl Evaluation<'_> {
     /// The material that touches a wall although a film of thin fluid lies between, and the degree from 0
     /// to 1 to which it does.
     ///
-    /// A side along which the velocity is prescribed is a rough wall. Material that advances along it rolls
+    /// A side along which the velocity is prescribed is a rough wall; where gravity does not pull away from
+    /// it, material may lie on it (a gap below a ceiling is no film). Material that advances along it rolls
     /// over what was there before, since nothing moves at the wall itself. The film that remains in
     /// less than half of the row of cells at the wall would let the material glide. Real films are thinner by
     /// orders of magnitude, and break. So in such a cell the material has its own law, and the film has its
@@ -117,8 +118,7 @@ impl Evaluation<'_> {
         between: [usize; 2],
         centroids: &Centroids,
     ) -> Option<(usize, f64)> {
-        let held = self.walls[cell].along;
-        if held == [false; 4] {
+        if !(0..4).any(|side| self.walls.carries(cell, side)) {
             return None;
         }
         let [from, to] = between.map(|m| &self.materials[m]);
@@ -143,7 +143,7 @@ impl Evaluation<'_> {
         // The side that the film lies on, if it lies on one.
         let normal = usize::from(way[0].abs() < way[1].abs());
         let side = 2 * normal + usize::from(way[normal] > 0.0);
-        let is_film = degree > 0.0 && held[side] && centroids.share(film) < 0.5;
+        let is_film = degree > 0.0 && self.walls.carries(cell, side) && centroids.share(film) < 0.5;
         is_film.then_some((material, degree))
     }
 }

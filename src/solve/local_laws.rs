@@ -9,7 +9,7 @@ use crate::laws::director::Orientation;
 use crate::laws::point::PointLaw;
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
-use crate::space::constraints::FixedSides;
+use crate::space::constraints::Walls;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
 use crate::space::shape::{GAUSS_6X6, SUBPOINTS};
@@ -34,7 +34,7 @@ pub struct Evaluation<'a> {
     /// Factor on each material's volume in cut cells.
     pub factors: &'a [f64],
     /// Sides of each cell on which the velocity is prescribed.
-    pub walls: &'a [FixedSides],
+    pub walls: &'a Walls,
     /// Last iterate, for laws that depend on rates or pressure.
     pub flow: &'a dyn LastFlow,
 }

@@ -34,7 +34,7 @@ use crate::laws::point::PointLaw;
 use crate::laws::rates::Rates;
 use crate::plan::material::Material;
 use crate::scene::Quadrature as Rule;
-use crate::space::constraints::FixedSides;
+use crate::space::constraints::Walls;
 use crate::space::kink::Kink;
 use crate::space::mesh::Mesh;
 use crate::space::particles::Particles;
@@ -55,7 +55,7 @@ pub struct Quadrature {
     /// Index of the first point of each cell, and the number of points.
     pub(super) start: Vec<u32>,
     /// Sides of each cell on which the velocity is prescribed.
-    pub(super) walls: Vec<FixedSides>,
+    pub(super) walls: Walls,
     /// Parts of cells with solids of any shape in them.
     parts: SharedParts,
     /// Stiffness of cut cells.
@@ -109,7 +109,7 @@ impl Quadrature {
             kinds: Vec::with_capacity(materials),
             points,
             start,
-            walls: vec![FixedSides::default(); cells],
+            walls: Walls::free(cells),
             parts: mesh.shared_parts(),
             cut: vec![None; cells],
             mean_viscosity: vec![0.0; cells],
@@ -291,8 +291,8 @@ impl Quadrature {
         // Particles as integration points move, so the matrix of a cell with particles always
         // changes.
         let moving = self.rule == Rule::Particles;
-        let Quadrature { composition, kinds, walls, .. } = self;
-        composition.update(mesh, particles, kinds, (background, version), (moving, walls))?;
+        let Quadrature { composition, kinds, walls: Walls { sides, .. }, .. } = self;
+        composition.update(mesh, particles, kinds, (background, version), (moving, sides))?;
         if self.rule == Rule::Particles {
             self.points.clear();
             for cell in 0..mesh.cells() {

@@ -20,7 +20,13 @@ const STICKING: f64 = 1e4;
 impl Quadrature {
     /// Declares the sides of each cell on which the velocity is prescribed.
     pub fn bind_walls(&mut self, fixed: impl Fn(usize) -> FixedSides) {
-        self.walls.iter_mut().enumerate().for_each(|(cell, walls)| *walls = fixed(cell));
+        let sides = self.walls.sides.iter_mut().enumerate();
+        sides.for_each(|(cell, sides)| *sides = fixed(cell));
+    }
+
+    /// Sets the current gravity, in the plan's units.
+    pub fn set_gravity(&mut self, gravity: [f64; 2]) {
+        self.walls.gravity = gravity;
     }
 
     /// Declares the faces and the points of outlines along which material slips.

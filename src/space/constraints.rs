@@ -16,6 +16,31 @@ pub struct FixedSides {
     pub along: [bool; 4],
 }
 
+/// What the rules of mixture need to know of the walls.
+#[derive(Clone, Debug)]
+pub struct Walls {
+    /// By cell.
+    pub sides: Vec<FixedSides>,
+    /// Current gravity.
+    pub gravity: [f64; 2],
+}
+
+impl Walls {
+    /// No walls and no gravity.
+    pub fn free(cells: usize) -> Self {
+        Walls { sides: vec![FixedSides::default(); cells], gravity: [0.0; 2] }
+    }
+
+    /// Whether a side of a cell is a rough wall on which material may lie: the velocity along it is
+    /// prescribed, and gravity does not pull away from it.
+    pub fn carries(&self, cell: usize, side: usize) -> bool {
+        let down = self.gravity[side_normal(side)];
+        let outward = if side % 2 == 1 { down } else { -down };
+        let rounding = 1e-9 * self.gravity[0].hypot(self.gravity[1]);
+        self.sides[cell].along[side] && outward >= -rounding
+    }
+}
+
 /// Prescribed values of nodal unknowns, and the null spaces that remain.
 #[derive(Clone, Debug)]
 pub struct Constraints<const D: usize> {

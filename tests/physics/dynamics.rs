@@ -566,6 +566,30 @@ fn a_turned_slump_is_the_same() {
     }
 }
 
+/// Power of the weight of a layer between rough walls, with a gap of a fifth of a cell of thin air at the upper
+/// one, in which gravity is `[0.1, vertical]`; over that between two walls without a gap.
+fn power_with_a_gap(contrast: f64, vertical: f64) -> f64 {
+    let text = format!(
+        "schema = 1\nname = \"gap\"\ngravity = [0.1, {vertical}]\n[domain]\nx = [0, 1]\ny = [0, 1]\n\
+         length_scale = 1\n[accuracy]\ncells = 8\nparticles_per_cell = 100\n[time]\nend = 1\n[boundaries]\n\
+         left.kind = \"periodic\"\nright.kind = \"periodic\"\nbottom.kind = \"no_slip\"\n\
+         top.kind = \"no_slip\"\n[materials.mud]\ndensity = 1\nshear_viscosity = 1\n[materials.air]\n\
+         shear_viscosity = \"1/{contrast}\"\n[[regions]]\nmaterial = \"air\"\n[[regions]]\nmaterial = \"mud\"\n\
+         shape.rectangle = {{ x = [0, 1], y = [0, 0.975] }}\n"
+    );
+    // rho g_x times the flux rho g_x/(12 eta).
+    scene(&text, &[]).row().power_in / (0.01 / 12.0)
+}
+
+#[test]
+fn a_film_under_material_is_nothing_at_a_contrast_of_1e6_and_a_gap_above_it_is_air() {
+    let [layer, nothing] = [1e4, 1e6].map(|contrast| power_with_a_gap(contrast, 1.0));
+    assert!((nothing - 1.0).abs() < 0.01, "{nothing}");
+    assert!(layer > 1.1, "{layer}");
+    let above = [1e4, 1e6].map(|contrast| power_with_a_gap(contrast, -1.0));
+    assert!(above.iter().all(|power| (power / layer - 1.0).abs() < 1e-3), "{above:?} {layer}");
+}
+
 #[test]
 fn a_slanted_gauge_counts_what_an_upright_one_counts() {
     // Mud below water between plates, driven by the upper one; the gauges reach from plate to plate.
