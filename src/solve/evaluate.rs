@@ -139,10 +139,12 @@ impl Evaluation<'_> {
                 cut
             }
             Form::Sides { cut, between, .. } => self.sides(cell, cut, between, (scratch, out)),
-            _ => match void {
-                Some(void) => self.spread(cell, 1.0 - void.share),
-                None => return,
-            },
+            Form::Film { .. } | Form::Even | Form::Weights | Form::Drops { .. } | Form::Mixture => {
+                match void {
+                    Some(void) => self.spread(cell, 1.0 - void.share),
+                    None => return,
+                }
+            }
         };
         if let Some(void) = void {
             *out.mean_viscosity /= 1.0 - void.share;

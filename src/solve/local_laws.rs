@@ -33,7 +33,7 @@ pub struct Evaluation<'a> {
     pub fill: Option<&'a Fill>,
     /// Factor on each material's volume in cut cells.
     pub factors: &'a [f64],
-    /// Sides of each cell on which the velocity is prescribed.
+    /// Sides of each cell on which the velocity is prescribed, and gravity.
     pub walls: &'a Walls,
     /// Last iterate, for laws that depend on rates or pressure.
     pub flow: &'a dyn LastFlow,

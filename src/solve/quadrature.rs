@@ -54,7 +54,7 @@ pub struct Quadrature {
     pub(super) points: Vec<IntegrationPoint>,
     /// Index of the first point of each cell, and the number of points.
     pub(super) start: Vec<u32>,
-    /// Sides of each cell on which the velocity is prescribed.
+    /// Sides of each cell on which the velocity is prescribed, and gravity.
     pub(super) walls: Walls,
     /// Parts of cells with solids of any shape in them.
     parts: SharedParts,

@@ -19,9 +19,9 @@ pub struct FixedSides {
 /// What the rules of mixture need to know of the walls.
 #[derive(Clone, Debug)]
 pub struct Walls {
-    /// By cell.
+    /// Sides of each cell on which the velocity is prescribed.
     pub sides: Vec<FixedSides>,
-    /// Current gravity.
+    /// Current gravity, in the plan's units.
     pub gravity: [f64; 2],
 }
 
